@@ -21,8 +21,9 @@ int status_command(const StatusOptions& options) {
     std::string answer;
     try {
       answer = ask_control_socket(path, options.json ? "status" : "status text");
-    } catch (const description::SetupError&) {
-      if (first) throw;
+    } catch (const description::SetupError& error) {
+      const bool suspended = error.found().starts_with("no answer");
+      if (first || suspended) throw;
       return fine;  // the session has ended
     }
     if (!answer.starts_with(agreed)) throw description::SetupError({.message = answer});

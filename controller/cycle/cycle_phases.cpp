@@ -90,13 +90,13 @@ void Cycle::await_begin(std::int64_t t_k_ns) noexcept {
 void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
   const Measured& measured = measurement_.now();
   motion_->wait_for_drives(measured);
-  const auto axes = static_cast<int>(measured.axes());
-  const int first_not_following = std::countr_one(measured.following);
-  if (first_not_following >= axes) {
+  if (std::countr_one(measured.following) >= static_cast<int>(measured.axes())) {
     supervisor_.handle(state_.tared ? Event::reenabled : Event::enabled);
-  } else if (in_phase_s(t_k_ns) > settings_.enable_timeout_s) {
-    alarm_.raise(Fault::drive_not_enabled, first_not_following, in_phase_s(t_k_ns), settings_.enable_timeout_s);
+    return;
   }
+  const double waited_s = in_phase_s(t_k_ns);
+  const OverdueDrive overdue = first_overdue(parts_.drives, measured.following, waited_s, settings_.enable_timeout_s);
+  if (overdue.drive >= 0) alarm_.raise(Fault::drive_not_enabled, overdue.drive, waited_s, overdue.limit_s);
 }
 
 void Cycle::tare(std::int64_t t_k_ns) noexcept {

@@ -84,7 +84,7 @@ std::string place_of(const FaultReport& report, const CycleParts& parts, const d
   std::string place = "drive of " + drive.description().joint + ", bus " + drive.description().bus + ", node " +
                       std::to_string(drive.description().node);
   if (report.fault == Fault::drive_fault || report.fault == Fault::drive_disabled ||
-      report.fault == Fault::modbus_silent) {
+      report.fault == Fault::drive_not_enabled || report.fault == Fault::modbus_silent) {
     place += ": " + drive.describe();
   }
   return place;

@@ -36,6 +36,15 @@ struct DriveOnBus {
   std::size_t bus;               // index in the network; no_bus: on a Modbus line
 };
 
+// The first drive that takes no setpoints yet although its time for that is over (`enable_timeout_s` of the cell's
+// drive, or `usual_s`); drive −1: none. `following`: a bit for each drive that does.
+struct OverdueDrive {
+  int drive = -1;
+  double limit_s = 0.0;
+};
+[[nodiscard]] OverdueDrive first_overdue(const std::vector<DriveOnBus>& drives, std::uint8_t following, double waited_s,
+                                         double usual_s) noexcept;
+
 // A bus with drives, which get SYNC and the controller's heartbeat.
 struct DriveBus {
   std::size_t bus;

@@ -113,15 +113,17 @@ void BusLossSession::wait_for_drives(std::int64_t t_k_ns) noexcept {
   for (Eigen::Index i = 0; i < measured.axes(); ++i) {
     if ((measured.following & 1u << i) == 0) setpoints_.values[i] = measured.motor_rad[i];
   }
-  const int waits_for = std::countr_one(measured.following);
-  const double in_step_s = 1e-9 * static_cast<double>(t_k_ns - since_ns_);
-  if (waits_for >= static_cast<int>(measured.axes())) {
+  if (std::countr_one(measured.following) >= static_cast<int>(measured.axes())) {
     supervisor_.handle(Event::enabled);
     go_to(Step::taring, t_k_ns);
-  } else if (in_step_s > settings_.enable_timeout_s) {
-    alarm_.raise(Fault::drive_not_enabled, waits_for, in_step_s, settings_.enable_timeout_s);
-    go_to(Step::farewell, t_k_ns);
+    return;
   }
+  const double in_step_s = 1e-9 * static_cast<double>(t_k_ns - since_ns_);
+  const auto overdue =
+      controller::first_overdue(parts_.drives, measured.following, in_step_s, settings_.enable_timeout_s);
+  if (overdue.drive < 0) return;
+  alarm_.raise(Fault::drive_not_enabled, overdue.drive, in_step_s, overdue.limit_s);
+  go_to(Step::farewell, t_k_ns);
 }
 
 // By the time that the silence is judged, the frames of the last cycle have arrived; no drive reacts to these.

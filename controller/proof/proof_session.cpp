@@ -136,12 +136,13 @@ void ProofSession::wait_for_drives(double in_phase_s) noexcept {
   for (Eigen::Index i = 0; i < measured.axes(); ++i) {
     if ((measured.following & 1u << i) == 0) setpoints_.values[i] = measured.motor_rad[i];
   }
-  const int waits_for = std::countr_one(measured.following);
-  if (waits_for >= static_cast<int>(measured.axes())) {
+  if (std::countr_one(measured.following) >= static_cast<int>(measured.axes())) {
     supervisor_.handle(Event::enabled);
-  } else if (in_phase_s > settings_.enable_timeout_s) {
-    alarm_.raise(Fault::drive_not_enabled, waits_for, in_phase_s, settings_.enable_timeout_s);
+    return;
   }
+  const auto overdue =
+      controller::first_overdue(parts_.drives, measured.following, in_phase_s, settings_.enable_timeout_s);
+  if (overdue.drive >= 0) alarm_.raise(Fault::drive_not_enabled, overdue.drive, in_phase_s, overdue.limit_s);
 }
 
 void ProofSession::tare(double in_phase_s) noexcept {

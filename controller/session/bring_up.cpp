@@ -386,7 +386,7 @@ std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) 
   return ids;
 }
 
-Identities bring_up(CycleParts& parts, const LineStarter& start_line) {
+Identities bring_up(CycleParts& parts, const LineStarter& start_line, const fieldbus::Tell& tell) {
   refuse_shared_identifiers(parts);
   Identities lines;
   parts.sensor->start(parts.network, parts.sensor_bus);
@@ -396,7 +396,8 @@ Identities bring_up(CycleParts& parts, const LineStarter& start_line) {
     start_line(*line);
   }
   if (!parts.modbus_lines.empty()) parts.network.sleep_until(parts.network.now_ns() + rate_measurement_ns);
-  const std::vector<fieldbus::DriveIdentity> identities = fieldbus::bring_up_drives(parts.network, parts.can_drives);
+  const std::vector<fieldbus::DriveIdentity> identities =
+      fieldbus::bring_up_drives(parts.network, parts.can_drives, {}, tell);
   for (std::size_t i = 0; i < identities.size(); ++i) {
     lines.push_back("drive of " + parts.can_drives[i].drive->description().joint + ": " + describe(identities[i]));
   }

@@ -58,8 +58,10 @@ using Identities = std::vector<std::string>;
 using LineStarter = std::function<void(fieldbus::ModbusLine&)>;
 
 // NMT, SDO configuration written and read back, sensor calibration read; drives end in NMT operational, not enabled.
-// Modbus lines are left running, and their rates have been measured for a quarter of a second.
+// Modbus lines are left running, and their rates have been measured for a quarter of a second. `tell` gets what drives
+// needed besides, such as what was done against an error from before.
 Identities bring_up(
-    CycleParts& parts, const LineStarter& start_line = [](fieldbus::ModbusLine& line) { line.start(); });
+    CycleParts& parts, const LineStarter& start_line = [](fieldbus::ModbusLine& line) { line.start(); },
+    const fieldbus::Tell& tell = {});
 
 }  // namespace proxarm::controller

@@ -97,6 +97,13 @@ bool decode_emcy(const CanFrame& frame, std::int64_t time_ns, std::uint8_t node,
   return true;
 }
 
+bool is_warning(const Emergency& emergency) noexcept {
+  constexpr std::uint16_t error_passive = 0x8120, pdo_length_exceeded = 0x8220;
+  if (emergency.code == error_passive || emergency.code == pdo_length_exceeded) return true;
+  const unsigned group = emergency.code >> 8;
+  return emergency.error_register == 0 && (group == 0x81 || group == 0xFF);
+}
+
 std::string_view emcy_text(std::uint16_t code) noexcept {
   for (const Wording& wording : wordings) {
     if ((code & wording.mask) == wording.code) return wording.text;

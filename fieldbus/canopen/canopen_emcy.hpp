@@ -26,6 +26,11 @@ struct Emergency {
 // without an error code it isn't one.
 bool decode_emcy(const CanFrame& frame, std::int64_t time_ns, std::uint8_t node, Emergency& out) noexcept;
 
+// Whether the drive goes on as before, by its own words: 8120h (its CAN controller counts many errors, but hears and
+// speaks), 8220h (a PDO was longer than its mapping, of which the first bytes count), and codes of the communication
+// (81xxh) and the maker's (FFxxh) with no bit in the error register. Any other is taken for a fault: CiA 301 and 402
+// have no class for warnings, a drive that trips says so by EMCY first, and not each fills its error register.
+[[nodiscard]] bool is_warning(const Emergency& emergency) noexcept;
 // The wording of CiA 301 (classes) and CiA 402 (drives) for a code; the class's where the exact code isn't known.
 [[nodiscard]] std::string_view emcy_text(std::uint16_t code) noexcept;
 // "EMCY 8130: life guard error or heartbeat error (error register 11: generic, communication)"

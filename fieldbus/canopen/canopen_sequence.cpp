@@ -78,7 +78,7 @@ void SdoSequence::start(std::int64_t now_ns) {
 void SdoSequence::begin_step(std::int64_t now_ns) {
   step_begun_ns_ = now_ns;
   attempt_ = 0;
-  as_found_ = false;
+  refused_ = Refused::no;
   ask(steps_[next_].kind == SdoStep::Kind::write, now_ns);
 }
 
@@ -149,7 +149,7 @@ void SdoSequence::on_value(std::int64_t now_ns) {
   std::copy(data.begin(), data.end(), bytes.begin());
   const std::uint32_t value = read_u32_le(bytes.data()) & size_mask(step.bytes);
   const bool fits = step.kind == SdoStep::Kind::read || (value & step.mask) == (step.value & step.mask);
-  if (step.kind == SdoStep::Kind::write && (as_found_ || !fits)) {
+  if (step.kind == SdoStep::Kind::write && (refused_ != Refused::no || !fits)) {
     take_as_found(value, now_ns);
     return;
   }
@@ -173,7 +173,8 @@ void SdoSequence::take_as_found(std::uint32_t value, std::int64_t now_ns) {
   const SdoStep& step = steps_[next_];
   const auto is = [&](std::uint32_t wanted) { return ((value ^ wanted) & step.mask & size_mask(step.bytes)) == 0; };
   const bool fits = is(step.value) || std::any_of(step.as_found.begin(), step.as_found.end(), is);
-  const bool may_be_anything = as_found_ && step.is_optional && step.as_found.empty();
+  const bool couldnt_write = refused_ != Refused::no;
+  const bool may_be_anything = couldnt_write && step.is_optional && step.as_found.empty();
   if (!fits && !may_be_anything) {
     std::string expected = value_text(step.value, step.bytes);
     for (const std::uint32_t other : step.as_found) {
@@ -181,16 +182,17 @@ void SdoSequence::take_as_found(std::uint32_t value, std::int64_t now_ns) {
     }
     const std::uint32_t shown_mask = step.mask & size_mask(step.bytes);
     if (shown_mask != size_mask(step.bytes)) expected += " in the bits " + hex_text(shown_mask, 2 * step.bytes);
-    fail(value_text(value, step.bytes) + (as_found_ ? ", which can't be written" : ""), std::move(expected),
-         as_found_ ? "set it by the maker's tool, if that can"
-                   : "the drive took the value without an error but kept another; is it limited or locked by the "
-                     "maker's tool?");
+    fail(value_text(value, step.bytes) + (couldnt_write ? ", which can't be written" : ""), std::move(expected),
+         couldnt_write ? "set it by the maker's tool, if that can"
+                       : "the drive took the value without an error but kept another; is it limited or locked by the "
+                         "maker's tool?");
     return;
   }
   fixed_ += (fixed_.empty() ? "" : ", ") + to_string(step.object);
-  if (!is(step.value) && *step.lost != '\0') {
+  if (!is(step.value) && (*step.lost != '\0' || refused_ == Refused::value)) {
     lose(to_string(step.object) + " is " + value_text(value, step.bytes) + " and can't be set to " +
-         value_text(step.value, step.bytes) + ": " + step.lost);
+         value_text(step.value, step.bytes) + ": " +
+         (*step.lost != '\0' ? std::string(step.lost) : "the drive has its own " + std::string(step.name)));
   }
   values_.push_back({step, value, true});
   advance(now_ns);
@@ -206,14 +208,25 @@ std::vector<std::string> SdoSequence::losses() const {
   return all;
 }
 
-// A write that the node refuses because of what the object is, not because of the value.
-bool SdoSequence::looks_at_what_is_there(std::uint32_t code, std::int64_t now_ns) {
-  constexpr std::uint32_t refusals[] = {sdo_abort::unsupported_access, sdo_abort::write_of_read_only,
-                                        sdo_abort::not_transferable, sdo_abort::local_control, sdo_abort::device_state};
+// What a node refuses because of what the object is, and what because of the value: many have fewer option codes and
+// narrower ranges than the profile. Of an optional object the value is its maker's then, as if it weren't there.
+SdoSequence::Refused SdoSequence::refused_by(std::uint32_t code) const noexcept {
+  constexpr std::uint32_t by_object[] = {sdo_abort::unsupported_access, sdo_abort::write_of_read_only,
+                                         sdo_abort::not_transferable, sdo_abort::local_control,
+                                         sdo_abort::device_state};
+  constexpr std::uint32_t by_value[] = {sdo_abort::invalid_value, sdo_abort::value_too_high, sdo_abort::value_too_low};
+  const auto is_in = [code](const auto& codes) {
+    return std::find(std::begin(codes), std::end(codes), code) != std::end(codes);
+  };
   const SdoStep& step = steps_[next_];
-  const bool is_refusal = std::find(std::begin(refusals), std::end(refusals), code) != std::end(refusals);
-  if (!writing_ || !is_refusal || (step.as_found.empty() && !step.is_optional)) return false;
-  as_found_ = true;
+  if (is_in(by_object) && (step.is_optional || !step.as_found.empty())) return Refused::object;
+  return is_in(by_value) && step.is_optional ? Refused::value : Refused::no;
+}
+
+bool SdoSequence::looks_at_what_is_there(std::uint32_t code, std::int64_t now_ns) {
+  if (!writing_ || refused_by(code) == Refused::no) return false;
+  refused_ = refused_by(code);
+  refusal_ = code;
   attempt_ = 0;
   ask(false, now_ns);
   return true;
@@ -245,9 +258,11 @@ void SdoSequence::on_failure(std::int64_t now_ns) {
         return;
       }
       if (looks_at_what_is_there(code, now_ns)) return;
-      failed_abort_ = code;
-      fail(describe_sdo_abort(code),
-           writing_ ? "to write " + value_text(step.value, step.bytes) : std::string("to read the object"),
+      // What can't be read either is told by what became of the write.
+      failed_abort_ = refused_ == Refused::no ? code : refusal_;
+      fail(describe_sdo_abort(failed_abort_),
+           writing_ || refused_ != Refused::no ? "to write " + value_text(step.value, step.bytes)
+                                               : std::string("to read the object"),
            step.advice);
       return;
     default:

@@ -27,12 +27,16 @@ struct SdoStep {
   std::uint32_t mask = 0xFFFFFFFF;  // bits that are compared
   const char* name = "";            // "modes of operation", for the message
   const char* advice = "";          // what the user can do where it differs; "" for the usual
-  bool is_optional = false;         // a node without the object is noted in missing(), not refused
-  const char* lost = "";            // what is lost without it, or with another value; for losses()
+  // A node without the object is noted in missing(), not refused; so is one that doesn't take the value.
+  bool is_optional = false;
+  const char* lost = "";  // what is lost without it, or with another value; for losses()
   // write: what may be found where the node doesn't let it be written, or keeps what it has; under `mask`. Empty: an
   // optional one may have any value then, another is refused.
   std::vector<std::uint32_t> as_found{};
   std::int64_t patience_ns = 0;  // expect: read again until it holds or this long has passed
+  // expect: the object shows a state, or what somebody wrote: a file's default of it is its value at power-up, and no
+  // requirement. Else it is the device's for good.
+  bool is_state = false;
 };
 
 // For the tables: the usual steps in one line each.
@@ -84,6 +88,8 @@ class SdoSequence {
   [[nodiscard]] std::int64_t wake_ns(std::int64_t now_ns) const noexcept;
 
  private:
+  enum class Refused : std::uint8_t { no, object, value };  // why a step couldn't be written, and is read
+
   void begin_step(std::int64_t now_ns);
   void ask(bool write, std::int64_t now_ns);
   void advance(std::int64_t now_ns);
@@ -91,6 +97,7 @@ class SdoSequence {
   void on_value(std::int64_t now_ns);
   void on_failure(std::int64_t now_ns);
   [[nodiscard]] bool looks_at_what_is_there(std::uint32_t code, std::int64_t now_ns);
+  [[nodiscard]] Refused refused_by(std::uint32_t code) const noexcept;
   void take_as_found(std::uint32_t value, std::int64_t now_ns);
   void lose(const std::string& text);
   void fail(std::string found, std::string expected, std::string advice);
@@ -111,8 +118,9 @@ class SdoSequence {
   std::vector<Value> values_;
   std::vector<std::string> missing_;
   std::vector<std::string> losses_;
-  std::string fixed_;      // objects that were taken as found, joined by commas
-  bool as_found_ = false;  // this step couldn't be written, and is read
+  std::string fixed_;  // objects that were taken as found, joined by commas
+  Refused refused_ = Refused::no;
+  std::uint32_t refusal_ = 0;  // the abort code of that
   std::uint32_t failed_abort_ = 0;
   std::optional<description::SetupProblem> problem_;
 };

@@ -4,6 +4,7 @@
 
 #include "fieldbus/can/byte_order.hpp"
 #include "fieldbus/can/frame_pump.hpp"
+#include "fieldbus/canopen/bus_leader.hpp"
 #include "fieldbus/canopen/canopen_object.hpp"
 #include "fieldbus/canopen/canopen_sdo.hpp"
 #include "fieldbus/canopen/canopen_sync.hpp"
@@ -51,16 +52,18 @@ class Scan {
 
   void listen(ScanResult& result) {
     std::map<std::pair<std::uint32_t, bool>, HeardIdentifier> heard;
-    pump(network_.now_ns() + settings_.listen_ns, [&](const CanFrame& frame) {
-      if (frame.error) return;
-      if (frame.id == sync_id && !frame.extended) refuse_running_bus();
+    const FrameHandler note = [&](std::size_t from, const TimedFrame& received) {
+      const CanFrame& frame = received.frame;
+      if (from != bus_ || frame.error) return;
       HeardIdentifier& one = heard[{frame.id, frame.extended}];
       one.id = frame.id;
       one.extended = frame.extended;
       one.fd = frame.fd;
       one.length = frame.length;
       ++one.frames;
-    });
+    };
+    const BusToLead bus{.bus = bus_};
+    require_nobody_leads(network_, {&bus, 1}, settings_.listen_ns, note);
     for (const auto& entry : heard) result.heard.push_back(entry.second);
   }
 
@@ -149,14 +152,6 @@ class Scan {
                                                                 : "an interface that is down",
                       .expected = "a bus with at least one other node, at the same bitrate",
                       .advice = "check the bitrate, the wiring and both terminations (120 ohm)"});
-  }
-
-  [[noreturn]] void refuse_running_bus() const {
-    throw SetupError({.bus = network_.bus(bus_).name(),
-                      .message = "somebody runs this bus",
-                      .found = "a SYNC (0x080)",
-                      .expected = "a bus that is at rest",
-                      .advice = "stop the other master first: a scan's requests would disturb its cycle"});
   }
 
   CanNetwork& network_;

@@ -1,9 +1,9 @@
 // What is on a CAN bus: listens, then asks every CANopen node what it is. Behind `proxarm scan`.
 //
-// A bus that somebody runs must not be disturbed: it listens first and refuses where a SYNC comes by. Then it sends SDO
-// uploads (reads) and nothing else; it changes nothing in any node. A guessed sensor identifier can be an NMT command
-// or somebody's setpoint, so a sensor is polled only at a base id that the user names (ATI Net CAN OEM: one that
-// answers polls; the others stream, and show among the identifiers heard).
+// A bus that somebody leads must not be disturbed: it listens first (bus_leader.hpp). Then it sends SDO uploads (reads)
+// and nothing else; it changes nothing in any node. A guessed sensor identifier can be an NMT command or somebody's
+// setpoint, so a sensor is polled only at a base id that the user names (ATI Net CAN OEM: one that answers polls; the
+// others stream, and show among the identifiers heard).
 #pragma once
 
 #include <array>
@@ -46,7 +46,7 @@ struct ScanResult {
   std::uint16_t sensor_status = 0;
 };
 
-// Throws SetupError where a SYNC is heard, the bus can't send, or the base id is no sensor's.
+// Throws SetupError where somebody leads the bus, the bus can't send, or the base id is no sensor's.
 [[nodiscard]] ScanResult scan_bus(CanNetwork& network, std::size_t bus, const ScanSettings& settings = {});
 
 // For people: lines, each ending in a newline.

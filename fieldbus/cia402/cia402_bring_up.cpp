@@ -1,9 +1,10 @@
 #include "fieldbus/cia402/cia402_bring_up.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <optional>
 
+#include "fieldbus/cia402/drive_exchange.hpp"
+#include "fieldbus/cia402/drive_start.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::fieldbus {
@@ -26,22 +27,6 @@ void refuse_shared_nodes(Slots drives) {
            .advice =
                "set another node at one of the drives, or give each of the cell's buses an interface of its own"});
     }
-  }
-}
-
-void send_nmt(CanNetwork& network, Slots drives, NmtCommand command, const char* name) {
-  for (const DriveSlot& slot : drives) {
-    const SendResult result = network.bus(slot.bus).send(nmt_frame(command, slot.drive->node()));
-    if (result == SendResult::sent) continue;
-    const char* found = result == SendResult::queue_full ? "a full queue"
-                        : result == SendResult::bus_off  ? "bus-off"
-                        : result == SendResult::refused  ? "a frame that the interface can't carry"
-                                                         : "an interface that is down";
-    throw SetupError({.bus = slot.drive->description().bus,
-                      .node = slot.drive->node(),
-                      .message = std::string("the NMT command ") + name + " could not be sent",
-                      .found = found,
-                      .advice = "is the interface up, and is another node on the bus to acknowledge frames?"});
   }
 }
 
@@ -95,42 +80,10 @@ bool some_feedback_given_up(Slots drives, const std::vector<SdoSequence>& sequen
 }
 
 // The same exchange with every drive, side by side. nullopt: something was given up, so that it must be done again.
-template <class StepsOf>
 std::optional<std::vector<DriveIdentity>> try_to_configure(CanNetwork& network, Slots drives,
-                                                           const FrameHandler& handler, StepsOf steps_of) {
-  std::vector<SdoSequence> sequences;
-  sequences.reserve(drives.size());
-  for (const DriveSlot& slot : drives) {
-    const ServoDrive& drive = *slot.drive;
-    sequences.emplace_back(network.bus(slot.bus), drive.node(), drive.description().bus,
-                           "drive of " + drive.description().joint, steps_of(drive), drive.settings().sdo);
-  }
-  for (SdoSequence& sequence : sequences) sequence.start(network.now_ns());
-  std::vector<std::uint64_t> boot_ups;  // at its first answer: one that restarts later forgets it all
-  for (const DriveSlot& slot : drives) boot_ups.push_back(slot.drive->boot_ups());
-  const FrameHandler on_frame = [&](std::size_t bus, const TimedFrame& received) {
-    bool taken = false;
-    for (std::size_t i = 0; i < sequences.size() && !taken; ++i) {
-      if (drives[i].bus != bus) continue;
-      const bool answered = sequences[i].answered();
-      taken = sequences[i].on_frame(received.frame, received.time_ns);
-      if (!answered && sequences[i].answered()) boot_ups[i] = drives[i].drive->boot_ups();
-    }
-    if (!taken) handler(bus, received);
-  };
-  // Each exchange has its own deadline, so the whole ends by itself.
-  constexpr std::int64_t forever = std::numeric_limits<std::int64_t>::max();
-  pump_frames(network, forever, on_frame, [&](std::int64_t now_ns) {
-    std::int64_t wake_ns = forever;
-    bool done = true;
-    for (SdoSequence& sequence : sequences) {
-      sequence.poll(now_ns);
-      if (sequence.finished()) continue;
-      done = false;
-      wake_ns = std::min(wake_ns, sequence.wake_ns(now_ns));
-    }
-    return done ? pump_done : wake_ns;
-  });
+                                                           const FrameHandler& handler, const StepsOf& steps_of) {
+  std::vector<std::uint64_t> boot_ups;
+  const std::vector<SdoSequence> sequences = exchange(network, drives, handler, steps_of, &boot_ups);
   if (some_feedback_given_up(drives, sequences)) return std::nullopt;
   throw_problems(drives, sequences);
   for (std::size_t i = 0; i < drives.size(); ++i) refuse_restart(*drives[i].drive, boot_ups[i]);
@@ -143,30 +96,27 @@ std::optional<std::vector<DriveIdentity>> try_to_configure(CanNetwork& network, 
 }
 
 // Each time feedback becomes less, so it ends.
-template <class StepsOf>
-std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const FrameHandler& handler, StepsOf steps_of) {
+std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const FrameHandler& handler,
+                                     const StepsOf& steps_of) {
   for (;;) {
     if (auto identities = try_to_configure(network, drives, handler, steps_of)) return *identities;
   }
 }
 
-void wait_for_state(CanNetwork& network, Slots drives, const FrameHandler& handler, NmtState state,
-                    const char* advice) {
-  const auto in_state = [state](const DriveSlot& slot) { return slot.drive->nmt_state() == state; };
+void require_pre_operational(CanNetwork& network, Slots drives, const FrameHandler& handler) {
   std::int64_t timeout_ns = 0;
   for (const DriveSlot& slot : drives) timeout_ns = std::max(timeout_ns, slot.drive->settings().nmt_timeout_ns);
-  const std::int64_t deadline_ns = network.now_ns() + timeout_ns;
-  const bool all = pump_frames(network, deadline_ns, handler, [&](std::int64_t) {
-    return std::all_of(drives.begin(), drives.end(), in_state) ? pump_done : deadline_ns;
-  });
-  if (all) return;
-  const ServoDrive& drive = *std::find_if_not(drives.begin(), drives.end(), in_state)->drive;
-  throw SetupError({.bus = drive.description().bus,
-                    .node = drive.node(),
-                    .message = "drive of " + drive.description().joint + ", NMT state in its heartbeat",
-                    .found = std::string(to_string(drive.nmt_state())),
-                    .expected = std::string(to_string(state)),
-                    .advice = advice});
+  if (wait_for_state(network, drives, handler, NmtState::pre_operational, timeout_ns)) return;
+  const ServoDrive& drive = *std::find_if_not(drives.begin(), drives.end(), [](const DriveSlot& slot) {
+                               return slot.drive->nmt_state() == NmtState::pre_operational;
+                             })->drive;
+  throw SetupError(
+      {.bus = drive.description().bus,
+       .node = drive.node(),
+       .message = "drive of " + drive.description().joint + ", NMT state in its heartbeat",
+       .found = std::string(to_string(drive.nmt_state())),
+       .expected = std::string(to_string(NmtState::pre_operational)),
+       .advice = "it took its configuration but doesn't stay in pre-operational: is another master on the bus?"});
 }
 
 }  // namespace
@@ -202,7 +152,8 @@ std::vector<std::string> losses_of(Slots drives) {
   return lines;
 }
 
-std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, Slots drives, const FrameHandler& other) {
+std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, Slots drives, const FrameHandler& other,
+                                           const Tell& tell) {
   refuse_shared_nodes(drives);
   const FrameHandler handler = [&](std::size_t bus, const TimedFrame& received) {
     for (const DriveSlot& slot : drives) {
@@ -210,15 +161,17 @@ std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, Slots drives, co
     }
     if (other) other(bus, received);
   };
+  const auto configure_all = [&](Slots some) {
+    auto identities =
+        configure(network, some, handler, [](const ServoDrive& drive) { return drive.configuration_steps(); });
+    require_pre_operational(network, some, handler);
+    return identities;
+  };
   send_nmt(network, drives, NmtCommand::enter_pre_operational, "enter pre-operational");
-  std::vector<DriveIdentity> identities =
-      configure(network, drives, handler, [](const ServoDrive& drive) { return drive.configuration_steps(); });
-  wait_for_state(network, drives, handler, NmtState::pre_operational,
-                 "it took its configuration but doesn't stay in pre-operational: is another master on the bus?");
-  send_nmt(network, drives, NmtCommand::start, "start");
-  wait_for_state(network, drives, handler, NmtState::operational,
-                 "it took its configuration but doesn't start: look at its display or its error list (1003h)");
-  configure(network, drives, handler, [](const ServoDrive& drive) { return drive.operation_steps(); });
+  std::vector<DriveIdentity> identities = configure_all(drives);
+  start_drives(
+      network, drives, handler, [&](Slots some) { (void)configure_all(some); }, tell);
+  (void)configure(network, drives, handler, [](const ServoDrive& drive) { return drive.operation_steps(); });
   for (const DriveSlot& slot : drives) slot.drive->start_cycle(network.now_ns());
   return identities;
 }

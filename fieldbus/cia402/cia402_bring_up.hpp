@@ -11,6 +11,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -43,10 +44,15 @@ struct DriveIdentity {
 // What the drives lack, a line each: "drives of axis_1, axis_2: no 6007h:00: …".
 [[nodiscard]] std::vector<std::string> losses_of(std::span<const DriveSlot> drives);
 
+// Gets what was done besides the usual, a line each: "drive of axis_1 (bus can, node 1): started after …".
+using Tell = std::function<void(const std::string&)>;
+
 // Frames that aren't the drives' go to `other`. Two drives with one node on one bus are refused (one interface may
 // carry several of the cell's buses). The drives' start_cycle() is called at the end.
 std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, std::span<const DriveSlot> drives,
-                                           const FrameHandler& other = {});
+                                           const FrameHandler& other = {}, const Tell& tell = {});
+
 // Whether its last word was that it has no power; it then needs nobody to watch over it.
 [[nodiscard]] bool is_switched_off(const ServoDrive& drive) noexcept;
+
 }  // namespace proxarm::fieldbus

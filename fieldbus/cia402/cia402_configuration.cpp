@@ -109,8 +109,10 @@ void append_torque(std::vector<SdoStep>& steps, const description::DriveDescript
   const auto rated_mNm = static_cast<std::uint32_t>(std::llround(1e3 * drive.rated_torque_Nm / drive.gear_ratio));
   const auto most = static_cast<std::uint32_t>(std::llround(1e3 * drive.max_torque_Nm / drive.rated_torque_Nm));
   const double rpm = 60.0 / (2.0 * std::numbers::pi) * drive.max_speed_rad_per_s * drive.gear_ratio;
-  steps.push_back(if_present(sdo_expect({0x6076, 0}, 4, rated_mNm, "motor rated torque (mNm)",
-                                        "is rated_torque_Nm in the cell's file this motor's, times its gear_ratio?")));
+  SdoStep rated = sdo_expect({0x6076, 0}, 4, rated_mNm, "motor rated torque (mNm)",
+                             "is rated_torque_Nm in the cell's file this motor's, times its gear_ratio?");
+  rated.is_state = true;  // the drive learns its motor
+  steps.push_back(if_present(rated));
   steps.push_back(sdo_write({0x6072, 0}, 2, most, "max torque"));
   steps.push_back(if_present(sdo_write({0x6080, 0}, 4, static_cast<std::uint32_t>(std::ceil(rpm)), "max motor speed")));
 }
@@ -118,8 +120,7 @@ void append_torque(std::vector<SdoStep>& steps, const description::DriveDescript
 // What the drive does when we are gone or when it is told to stop. 1016h is a must, since it is what stops the arm when
 // the controller dies; the others have defaults in the standard that stop it too.
 void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings) {
-  const std::uint32_t consumer =
-      static_cast<std::uint32_t>(settings.master_node) << 16 | settings.master_heartbeat_timeout_ms;
+  const std::uint32_t consumer = settings.consumer_heartbeat();
   // Off first: a drive that still watches for the last session's controller would trip in the middle of this set-up.
   steps.push_back(sdo_write({0x1016, 1}, 4, 0, "consumer heartbeat time (of the controller)"));
   steps.push_back(sdo_write({0x1016, 1}, 4, consumer, "consumer heartbeat time (of the controller)"));
@@ -208,6 +209,7 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
       rpdo_bytes_(pdo_bytes(rpdo_mapping(drive))),
       torque_feedback_(mode_.torque),
       torque_byte_(extra_torque_byte(drive)),
+      mode_byte_(mode_display_byte(drive)),
       scale_(drive),
       heartbeat_(drive.node, std::int64_t{settings.drive_heartbeat_timeout_ms} * 1'000'000) {
   if (drive.node < 1 || drive.node > 127) refuse(drive, "node", std::to_string(drive.node), "1 to 127");
@@ -247,6 +249,7 @@ void ServoDrive::lose_feedback(const MappedObject& object) {
   });
   tpdo_bytes_ = pdo_bytes(tpdo_mapping(description_, torque_feedback_));
   torque_byte_ = extra_torque_byte(description_);
+  mode_byte_ = mode_display_byte(description_, torque_feedback_);
   const char* name = is_torque ? "no torque feedback" : "no such feedback in the record";
   losses_.push_back("no " + to_string(object.object) + " in its TPDO: " + name);
 }
@@ -307,17 +310,22 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
   std::vector<SdoStep> steps;
   append_identity(steps, description_);
   if (description_.homing) {
-    steps.push_back(
+    SdoStep homed =
         sdo_expect({description::homed_index, description::homed_subindex}, 4, description::homed_token(description_),
                    "configuration date",
-                   "its encoder is incremental, and it wasn't homed since power on: proxarm calibrate --home"));
+                   "its encoder is incremental, and it wasn't homed since power on: proxarm calibrate --home");
+    homed.is_state = true;
+    steps.push_back(homed);
   }
   append_pdos(steps, description_, rpdo_timeout_ms(settings_, settings_.period_ns, mode_.torque),
               settings_.inputs_object, torque_feedback_);
-  steps.push_back(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,
-                            "interpolation time period value"));
-  steps.push_back(sdo_write(object_address(description_.objects.interpolation_index), 1, as_u8(period.exponent),
-                            "interpolation time index"));
+  // A drive may have one of both for good: it fits where it is what this period needs.
+  steps.push_back(or_found(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,
+                                     "interpolation time period value"),
+                           {period.units}));
+  steps.push_back(or_found(sdo_write(object_address(description_.objects.interpolation_index), 1,
+                                     as_u8(period.exponent), "interpolation time index"),
+                           {as_u8(period.exponent)}));
   steps.push_back(
       if_present(sdo_write({0x1006, 0}, 4, *sync_period_us(settings_.period_ns), "communication cycle period")));
   append_reactions(steps, settings_);
@@ -332,11 +340,45 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
   steps.push_back(if_present(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
   if (mode_.torque) append_torque(steps, description_);
   steps.push_back(sdo_write(object_address(description_.objects.mode), 1, mode_.number, "modes of operation"));
+  if (description_.shows_mode_enabled) return steps;  // the cycle looks at it, in TPDO1
   SdoStep display = sdo_expect(object_address(description_.objects.mode_display), 1, mode_.number,
                                "modes of operation display", mode_.not_taken);
+  display.is_state = true;
   display.patience_ns = mode_patience_ns;
   steps.push_back(display);
   return steps;
+}
+
+// Where it stood when operation was given up, and what to look for.
+std::string ServoDrive::stuck_text() const {
+  const auto word = static_cast<std::uint16_t>(stuck_);
+  const DriveState state = decode_state(word);
+  std::string text = "it stayed in " + std::string(to_string(state)) + " (statusword " + hex_text(word, 4) + "): ";
+  switch (state) {
+    case DriveState::not_ready_to_switch_on:
+      return text + "it is still starting up, or its firmware waits for something; look at its display";
+    case DriveState::switch_on_disabled:
+      return text +
+             "its power stage is kept off; is STO closed (E-stop released, safety relay on), is the power supply " +
+             "on" + ((word & statusword::voltage_enabled) == 0 ? " (bit 4 says: no voltage)" : "") +
+             ", is its hardware enable input set?";
+    case DriveState::ready_to_switch_on:
+      return text + "it doesn't take `switch on`; is the main contactor closed and the DC link charged?";
+    case DriveState::switched_on:
+      return text +
+             "it doesn't take `enable operation`; look at its display: mode, interpolation period and SYNC, and "
+             "its hardware enable input";
+    case DriveState::operation_enabled:
+      break;
+    default:
+      return text + "look at its display and its error list (1003h)";
+  }
+  if (mode_byte_ && shown_mode_ != mode_.number) {
+    return text + "6061h shows mode " + std::to_string(shown_mode_) + " and not " + std::to_string(mode_.number);
+  }
+  return text +
+         "it is enabled, but never says that it follows its targets (bit 12 of the statusword); a slow brake wants "
+         "`enable_timeout_s` in the cell";
 }
 
 std::string ServoDrive::describe() const {
@@ -350,6 +392,7 @@ std::string ServoDrive::describe() const {
   if (following_error()) text += ", following error";
   if (internal_limit()) text += ", internal limit active";
   if (fault_ != DriveFault::none) text += std::string("; ") + to_string(fault_);
+  if (stuck_ != 0) text += "; " + stuck_text();
   if (emergencies_ > 0) text += "; last " + fieldbus::describe(emergency_);
   return text;
 }

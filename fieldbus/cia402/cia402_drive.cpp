@@ -11,6 +11,8 @@ namespace proxarm::fieldbus {
 namespace {
 
 constexpr int syncs_before_enable = 3;  // that must have latched target = actual before 0F
+// So many cycles in a row with two TPDOs: late ones and doubled frames of a bad line don't come at each SYNC.
+constexpr std::uint32_t most_doubled_cycles = 10;
 
 }  // namespace
 
@@ -29,6 +31,7 @@ void ServoDrive::start_cycle(std::int64_t now_ns) noexcept {
     heartbeat_.stop_watching();
   }
   boot_ups_at_start_ = heartbeat_.boot_ups();
+  tpdos_in_cycle_ = doubled_cycles_ = 0;
   cycles_without_tpdo_ = 0;
   fresh_ = true;  // nothing was due before the first SYNC
 }
@@ -37,7 +40,21 @@ void ServoDrive::raise(DriveFault fault) noexcept {
   if (fault_ == DriveFault::none) fault_ = fault;
 }
 
+void ServoDrive::request(DriveGoal goal) noexcept {
+  const bool wanted = goal_ == DriveGoal::operation_enabled, wants = goal == DriveGoal::operation_enabled;
+  if (wanted && !wants && heard_ && !following_) stuck_ = 1U << 16 | statusword_;
+  if (wants) stuck_ = 0;
+  goal_ = goal;
+}
+
+void ServoDrive::judge_doubled() noexcept {
+  doubled_cycles_ = tpdos_in_cycle_ > 1 ? doubled_cycles_ + 1 : 0;
+  tpdos_in_cycle_ = 0;
+  if (doubled_cycles_ >= most_doubled_cycles) raise(DriveFault::two_nodes);
+}
+
 void ServoDrive::on_sync(std::int64_t now_ns) noexcept {
+  judge_doubled();
   // The drive latches the RPDO sent before this SYNC.
   if (held_pending_) ++held_;
   held_pending_ = false;
@@ -53,6 +70,10 @@ bool ServoDrive::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept 
     if (emergency.code == 0) return true;  // an error is over; the latest one stays readable
     emergency_ = emergency;
     ++emergencies_;
+    if (frame.length > 2 && is_warning(emergency)) {  // with an error register
+      ++warnings_;
+      return true;
+    }
     if (cycling_ && goal_ == DriveGoal::operation_enabled && !old_fault_) raise(DriveFault::emergency);
     return true;
   }
@@ -74,9 +95,11 @@ bool ServoDrive::decode_tpdo(const CanFrame& frame) noexcept {
     return true;
   }
   if (fresh_) ++repeated_tpdos_;
+  ++tpdos_in_cycle_;
   statusword_ = read_u16_le(&frame.data[0]);
   actual_counts_ = read_i32_le(&frame.data[2]);
   if (torque_feedback_) actual_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[6]));
+  if (mode_byte_) shown_mode_ = static_cast<std::int8_t>(frame.data[*mode_byte_]);
   if (torque_byte_) extra_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[*torque_byte_]));
   cycles_without_tpdo_ = 0;
   fresh_ = heard_ = true;
@@ -86,7 +109,7 @@ bool ServoDrive::decode_tpdo(const CanFrame& frame) noexcept {
   const bool enabled = state_ == DriveState::operation_enabled;
   if (state_ != DriveState::switched_on) held_ = 0;
   // Once it follows, it is commanded until it leaves operation enabled: bit 12 may drop at a limit.
-  following_ = enabled && (following_ || follows_command());
+  following_ = enabled && (following_ || (follows_command() && shows_mode()));
   if (goal_ == DriveGoal::operation_enabled) judge_state(was_enabled);
   return true;
 }
@@ -101,6 +124,8 @@ void ServoDrive::judge_state(bool was_enabled) noexcept {
     raise(DriveFault::left_operation);
   } else if (enabled && (statusword_ & statusword::remote) == 0) {
     raise(DriveFault::not_remote);
+  } else if (following_ && !shows_mode()) {
+    raise(DriveFault::mode_changed);
   }
 }
 

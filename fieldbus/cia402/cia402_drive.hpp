@@ -55,6 +55,10 @@ struct DriveSettings {
   // The drives stop within this time of the controller's last word, whatever else they watch: its heartbeat comes three
   // times as often.
   void stop_without_controller(double within_s) noexcept;
+  // 1016h:01, by which a drive watches the controller.
+  [[nodiscard]] std::uint32_t consumer_heartbeat() const noexcept {
+    return static_cast<std::uint32_t>(master_node) << 16 | master_heartbeat_timeout_ms;
+  }
   void validate() const;  // throws SetupError
 };
 
@@ -101,7 +105,7 @@ class ServoDrive final : public CyclicDrive {
   // ---- cycle ----
   // A fault that the drive is found in when operation is first wanted (its last controller died, say) is reset on the
   // way; any later one is raised as a fault, and only fault_reset leaves it.
-  void request(DriveGoal goal) noexcept override { goal_ = goal; }
+  void request(DriveGoal goal) noexcept override;
   // A SYNC is going out: what was received before it is no longer fresh. Also notices a lost heartbeat.
   void on_sync(std::int64_t now_ns) noexcept override;
   bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;  // true when it was this drive's
@@ -148,6 +152,7 @@ class ServoDrive final : public CyclicDrive {
   }
   [[nodiscard]] const Emergency& latest_emergency() const noexcept { return emergency_; }
   [[nodiscard]] std::uint64_t emergencies() const noexcept { return emergencies_; }
+  [[nodiscard]] std::uint64_t warnings() const noexcept { return warnings_; }  // EMCYs that stop nothing
   [[nodiscard]] std::uint64_t repeated_tpdos() const noexcept { return repeated_tpdos_; }
   // State, fault and latest EMCY in words; not for the cycle.
   [[nodiscard]] std::string describe() const override;
@@ -156,7 +161,7 @@ class ServoDrive final : public CyclicDrive {
     state(heartbeat_, goal_, state_, fault_, statusword_, controlword_, actual_counts_, target_counts_,
           boot_ups_at_start_, cycles_without_tpdo_, held_, held_pending_, cycling_, old_fault_, fresh_, heard_,
           following_, emergency_, emergencies_, repeated_tpdos_, target_torque_, actual_torque_, torque_per_Nm_,
-          tpdo_bytes_, torque_feedback_);
+          tpdo_bytes_, torque_feedback_, tpdos_in_cycle_, doubled_cycles_, shown_mode_, stuck_, warnings_);
   }
 
  private:
@@ -165,6 +170,9 @@ class ServoDrive final : public CyclicDrive {
   void leave_out_what_eds_lacks();
   [[nodiscard]] std::vector<SdoStep> profile_steps() const;
   bool decode_tpdo(const CanFrame& frame) noexcept;
+  void judge_doubled() noexcept;
+  [[nodiscard]] bool shows_mode() const noexcept { return !mode_byte_ || shown_mode_ == mode_.number; }
+  [[nodiscard]] std::string stuck_text() const;
   void judge_state(bool was_enabled) noexcept;
   void raise(DriveFault fault) noexcept;
 
@@ -175,6 +183,7 @@ class ServoDrive final : public CyclicDrive {
   std::uint8_t tpdo_bytes_, rpdo_bytes_;
   bool torque_feedback_;                     // in TPDO1, behind the position
   std::optional<std::uint8_t> torque_byte_;  // of 6077h among the feedback that nothing depends on
+  std::optional<std::uint8_t> mode_byte_;    // of 6061h among that feedback: it is watched
   std::vector<std::string> losses_;
   std::string fixed_by_eds_;  // until the drive itself has been asked
   CountScale scale_;
@@ -201,6 +210,11 @@ class ServoDrive final : public CyclicDrive {
   Emergency emergency_{};
   std::uint64_t emergencies_ = 0;
   std::uint64_t repeated_tpdos_ = 0;
+  std::uint64_t warnings_ = 0;
+  std::uint32_t tpdos_in_cycle_ = 0, doubled_cycles_ = 0;  // the latter in a row, with more than one
+  std::int8_t shown_mode_ = 0;                             // at mode_byte_
+  // Operation was given up before the drive took targets: its statusword then, with bit 16 set; 0: no such thing.
+  std::uint32_t stuck_ = 0;
 };
 
 }  // namespace proxarm::fieldbus

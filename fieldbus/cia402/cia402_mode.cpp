@@ -37,14 +37,31 @@ std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& driv
   return mapping;
 }
 
-std::optional<std::uint8_t> extra_torque_byte(const description::DriveDescription& drive) noexcept {
-  if (mode_of(drive).torque) return std::nullopt;
-  unsigned bits = 16 + 32;  // statusword and position
+namespace {
+
+constexpr unsigned statusword_and_position = 16 + 32, actual_torque = 16;  // bits
+
+// The first byte of an object among the cell's `feedback`, which begins behind so many bits.
+std::optional<std::uint8_t> feedback_byte(const description::DriveDescription& drive, std::uint32_t object,
+                                          std::uint8_t wide, unsigned bits) noexcept {
   for (const description::DriveFeedback& more : drive.feedback) {
-    if (more.object == drive.objects.torque && more.bits == 16) return static_cast<std::uint8_t>(bits / 8);
+    if (more.object == object && more.bits == wide) return static_cast<std::uint8_t>(bits / 8);
     bits += more.bits;
   }
   return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<std::uint8_t> extra_torque_byte(const description::DriveDescription& drive) noexcept {
+  if (mode_of(drive).torque) return std::nullopt;
+  return feedback_byte(drive, drive.objects.torque, 16, statusword_and_position);
+}
+
+std::optional<std::uint8_t> mode_display_byte(const description::DriveDescription& drive,
+                                              bool torque_feedback) noexcept {
+  const bool torque = mode_of(drive).torque && torque_feedback;
+  return feedback_byte(drive, drive.objects.mode_display, 8, statusword_and_position + (torque ? actual_torque : 0));
 }
 
 std::uint8_t pdo_bytes(const std::vector<MappedObject>& mapping) noexcept {

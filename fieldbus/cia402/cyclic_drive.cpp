@@ -22,6 +22,10 @@ const char* to_string(DriveFault fault) noexcept {
       return "the drive sent a TPDO shorter than its mapping";
     case DriveFault::not_remote:
       return "the drive is under local control";
+    case DriveFault::mode_changed:
+      return "the drive changed its mode of operation by itself (6061h)";
+    case DriveFault::two_nodes:
+      return "two drives answer with this node number: two TPDOs came at each SYNC";
     case DriveFault::target_out_of_range:
       return "a target did not fit the drive's 32-bit counts";
     case DriveFault::modbus_timeout:

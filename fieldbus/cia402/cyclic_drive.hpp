@@ -20,12 +20,14 @@ enum class DriveFault : std::uint8_t {
   none,
   state_fault,          // statusword says fault or fault reaction active, while operation was wanted
   left_operation,       // the drive left operation enabled by itself (quick stop, disabled, ...)
-  emergency,            // an EMCY with a code other than 0
+  emergency,            // an EMCY that is no warning (canopen_emcy.hpp)
   heartbeat_lost,       // no heartbeat for drive_heartbeat_timeout_ms
   restarted,            // boot-up message: the drive was reset, and has lost its configuration
   not_operational,      // someone else's NMT command took it out of operational
   pdo_short,            // a TPDO shorter than its mapping
   not_remote,           // statusword bit 9 is 0 in operation: the drive is under local control
+  mode_changed,         // 6061h shows another mode in operation, where the cell's `feedback` has it
+  two_nodes,            // two TPDOs at each SYNC: two drives with one node number
   target_out_of_range,  // a target that isn't finite or doesn't fit 32 bits; the one before is kept
   modbus_timeout,       // no answer for the description's stale_after_s
   modbus_exception,     // the drive refuses a request with an exception code

@@ -4,7 +4,6 @@
 #include <cstdio>
 
 #include "fieldbus/canopen/canopen_object.hpp"
-#include "models/description/homing.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -61,8 +60,7 @@ void check_step(const EdsFile& eds, const SdoStep& step) {
   if (step.kind == SdoStep::Kind::write && !object.writable && step.as_found.empty()) {
     refuse(eds, number_of(step.object), "AccessType", "ro", "one that can be written: " + std::string(step.name));
   }
-  const bool is_kept = step.object.index == description::homed_index;  // what was written there, not the default
-  if (step.kind == SdoStep::Kind::expect && !is_kept && object.default_value &&
+  if (step.kind == SdoStep::Kind::expect && !step.is_state && object.default_value &&
       (*object.default_value & step.mask) != step.value) {
     refuse(eds, number_of(step.object), "DefaultValue", hex_text(*object.default_value, 8),
            hex_text(step.value, 8) + " (" + step.name + ")" + (*step.advice == '\0' ? "" : "; ") + step.advice);

@@ -1,8 +1,10 @@
 #include "fieldbus/modbus/modbus_drive.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
+#include <thread>
 
 #include "models/base/setup_error.hpp"
 
@@ -160,7 +162,8 @@ bool ModbusDrive::exchange(ModbusClient& client, std::int64_t now_ns, std::int64
   return true;
 }
 
-// A single answer that is late or spoilt is noise on the line; an exception, a closed connection or another unit isn't.
+// A single answer that is late or spoilt is noise on the line, and a gateway that is busy (exception 6) asks to be
+// asked again; another exception, a closed connection or another unit ends it at once.
 void ModbusDrive::note(ModbusResult result, int exception, std::int64_t now_ns) noexcept {
   if (result == ModbusResult::ok) {
     const double interval_s = 1e-9 * static_cast<double>(now_ns - last_answer_ns_);
@@ -173,13 +176,40 @@ void ModbusDrive::note(ModbusResult result, int exception, std::int64_t now_ns) 
     answered_ = true;
     answer_.time_ns = now_ns;
   } else {
-    const bool noise = result == ModbusResult::timeout || result == ModbusResult::malformed;
+    const bool busy = result == ModbusResult::exception && exception == modbus_busy;
+    const bool noise = result == ModbusResult::timeout || result == ModbusResult::malformed || busy;
     if (answer_.fault == DriveFault::none && (!noise || now_ns - last_answer_ns_ > stale_ns_)) {
       answer_.fault = fault_of(result);
       answer_.exception = exception;
     }
   }
   feedbacks_.write(answer_);
+}
+
+bool ModbusDrive::in_range(std::int32_t counts) const noexcept {
+  constexpr double beyond = 0.05;  // of the range: a joint may stand a little out of it
+  const double more = beyond * (high_counts_ - low_counts_);
+  return counts >= low_counts_ - more && counts <= high_counts_ + more;
+}
+
+void ModbusDrive::judge_word_order() {
+  if (registers_.position.registers == 1) {
+    word_order_shown_ = true;
+    return;
+  }
+  const std::int32_t read = answer_.position_counts;
+  const auto bits = static_cast<std::uint32_t>(read);
+  const auto swapped = static_cast<std::int32_t>(bits << 16 | bits >> 16);
+  word_order_shown_ = in_range(read) && !in_range(swapped);
+  if (in_range(read) || !in_range(swapped)) return;
+  throw SetupError(
+      {.bus = description_.bus,
+       .node = description_.node,
+       .message = "drive of " + description_.joint + ": position, register " + std::to_string(registers_.position.at),
+       .found = std::to_string(read) + " counts, out of range_rad; with the words in the other order " +
+                std::to_string(swapped) + ", which is in it",
+       .expected = "a position in range_rad",
+       .advice = "is word_order in " + registers_.file.string() + " the other one? Nothing was sent to move"});
 }
 
 void ModbusDrive::start_up(ModbusClient& client, std::int64_t now_ns) {
@@ -196,13 +226,28 @@ void ModbusDrive::start_up(ModbusClient& client, std::int64_t now_ns) {
                       .expected = "an answer",
                       .advice = "compare unit, baud rate and registers with " + registers_.file.string()});
   };
+  // A gateway that is busy is asked again.
+  const auto asked = [&client](const auto& request) {
+    ModbusResult result = request();
+    for (int again = 0; again < 10 && result == ModbusResult::exception && client.exception() == modbus_busy; ++again) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      result = request();
+    }
+    return result;
+  };
   for (const description::ModbusSetting& setting : registers_.settings) {
     std::array<std::uint16_t, 2> words{}, read{};
     const auto count = static_cast<std::size_t>(setting.registers);
     put(words, setting.registers, setting.value);
     const std::string place = ", register " + std::to_string(setting.at);
-    require(client.write(description_.node, setting.at, {words.data(), count}), setting.name, place);
-    require(client.read(description_.node, setting.at, {read.data(), count}), setting.name, place);
+    require(asked([&] {
+              return client.write(description_.node, setting.at, {words.data(), count});
+            }),
+            setting.name, place);
+    require(asked([&] {
+              return client.read(description_.node, setting.at, {read.data(), count});
+            }),
+            setting.name, place);
     if (read == words) continue;
     const std::int64_t got =
         setting.registers == 1
@@ -214,7 +259,8 @@ void ModbusDrive::start_up(ModbusClient& client, std::int64_t now_ns) {
                       .found = std::to_string(got),
                       .expected = std::to_string(as_signed(setting.value, setting.registers))});
   }
-  require(talk(client, {}), "position and status", "");
+  require(asked([&] { return talk(client, {}); }), "position and status", "");
+  judge_word_order();
   note(ModbusResult::ok, 0, now_ns);
   sent_counts_ = answer_.position_counts;
 }

@@ -34,8 +34,13 @@ class ModbusDrive final : public CyclicDrive {
   // One exchange, begun at now_ns, the line coming round to this drive every exchange_ns. False: it had nothing to
   // send, since the cycle is gone.
   bool exchange(ModbusClient& client, std::int64_t now_ns, std::int64_t exchange_ns) noexcept;
-  // Before the cycle: settings written and read back, position read. Throws SetupError.
+  // Before the cycle: settings written and read back, position read. Throws SetupError, also where that position is out
+  // of the joint's range and would be in it with the words in the other order.
   void start_up(ModbusClient& client, std::int64_t now_ns);
+  // Whether that position shows that the file's word order is the drive's: in the other one it would be out of range. A
+  // position whose words are equal, such as 0, shows nothing; no later one would, since what is sent and what is read
+  // would both be the wrong way round.
+  [[nodiscard]] bool word_order_shown() const noexcept { return word_order_shown_; }
 
   // ---- the cycle's ----
   [[nodiscard]] const description::DriveDescription& description() const noexcept override { return description_; }
@@ -93,6 +98,8 @@ class ModbusDrive final : public CyclicDrive {
   std::size_t encode(const Setpoint& setpoint, std::int64_t now_ns, std::int64_t exchange_ns,
                      std::span<std::uint16_t> out) noexcept;
   ModbusResult talk(ModbusClient& client, std::span<const std::uint16_t> command) noexcept;
+  void judge_word_order();
+  [[nodiscard]] bool in_range(std::int32_t counts) const noexcept;
   void note(ModbusResult result, int exception, std::int64_t now_ns) noexcept;
   [[nodiscard]] std::int32_t field(std::span<const std::uint16_t> values, std::uint16_t first,
                                    const description::ModbusField& field) const noexcept;
@@ -113,7 +120,7 @@ class ModbusDrive final : public CyclicDrive {
   Feedback answer_;
   std::array<std::uint16_t, modbus_most_read> read_{};
   double sent_counts_ = 0.0;
-  bool cycling_ = false, status_known_ = false, answered_ = false;
+  bool cycling_ = false, status_known_ = false, answered_ = false, word_order_shown_ = false;
   std::int64_t last_answer_ns_ = 0;
   int exchanges_since_status_ = 0;
 

@@ -44,6 +44,9 @@ struct ModbusMessage {
 [[nodiscard]] ModbusResult decode_answer(std::span<const std::uint8_t> request, std::span<const std::uint8_t> answer,
                                          std::span<std::uint16_t> values, int& exception) noexcept;
 
+// Server device busy: the specification asks to send the request again later.
+inline constexpr int modbus_busy = 6;
+
 // "illegal data address", the specification's wording; "unknown" for codes that it doesn't have.
 [[nodiscard]] const char* modbus_exception_name(int code) noexcept;
 

@@ -74,6 +74,18 @@ constexpr StatusBit status_bits[] = {
 // Gaussian elimination with complete pivoting on rows scaled to 1 (force and torque rows differ in unit). The entries
 // are floats, each off by up to 2⁻²⁴ of itself; six eliminated columns add at most six such errors of the largest entry
 // (1) to what is left, so a pivot below 6·2⁻²⁴ can't be told from zero.
+// What comes in single frames, and once each: such an answer while another is waited for belongs to a request that was
+// given up. Taken for the present one's, rows of the calibration would stand in another's place.
+bool is_of_another_request(std::uint32_t answered, std::uint8_t asked) noexcept {
+  const bool is_single =
+      answered == op_serial || answered == op_counts || answered == op_units || answered == op_firmware;
+  return is_single && answered != asked;
+}
+
+std::string timeout_text(const AtiNetCanOemSettings& settings) {
+  return std::to_string(settings.answer_timeout_ns / 1'000'000) + " ms";
+}
+
 bool is_singular(std::array<std::array<double, 6>, 6> m) noexcept {
   for (auto& row : m) {
     double largest = 0.0;
@@ -145,6 +157,7 @@ std::vector<CanFrame> AtiNetCanOem::ask(CanNetwork& network, std::size_t bus, co
   request.length = static_cast<std::uint8_t>(data.size());
   std::copy(data.begin(), data.end(), request.data.begin());
   std::string trouble = "no answer";
+  bool late = false;
   for (int attempt = 0; attempt < settings_.attempts; ++attempt) {
     std::vector<CanFrame> answer;
     const std::int64_t sent_ns = network.now_ns();
@@ -161,6 +174,7 @@ std::vector<CanFrame> AtiNetCanOem::ask(CanNetwork& network, std::size_t bus, co
         if (other) other(from, received);
         return;
       }
+      if (is_of_another_request(frame.id & 0xFU, op)) late = true;
       // In order, all of this request: a late answer to an earlier one starts with a lower op or has another length.
       if (received.time_ns < sent_ns || answer.size() >= frames || frame.id != id(op) + answer.size()) return;
       if (frame.length != bytes) {
@@ -171,8 +185,13 @@ std::vector<CanFrame> AtiNetCanOem::ask(CanNetwork& network, std::size_t bus, co
     };
     // After a failed attempt the whole time-out passes, so its late answer isn't taken for the next one's.
     if (pump_frames(network, deadline_ns, handler,
-                    [&](std::int64_t) { return answer.size() == frames ? pump_done : deadline_ns; })) {
+                    [&](std::int64_t) { return late || answer.size() == frames ? pump_done : deadline_ns; }) &&
+        !late) {
       return answer;
+    }
+    if (late) {
+      refuse(what, "answers to earlier requests, which come too late", "each within " + timeout_text(settings_),
+             "what holds them back: a gateway, a bus that is full, or a sensor that is still starting up?");
     }
     if (!answer.empty()) trouble = std::to_string(answer.size()) + " of " + std::to_string(frames) + " answer frames";
   }

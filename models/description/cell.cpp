@@ -130,7 +130,8 @@ SimulatedDrive read_simulation(const YamlNode& node) {
   s.velocity_feedforward = node.number_or("velocity_feedforward", s.velocity_feedforward, 0.0, 1.0);
   s.acceleration_feedforward = node.number_or("acceleration_feedforward", s.acceleration_feedforward, 0.0, 1.0);
   s.servo_rate_Hz = node.number_or("servo_rate_Hz", s.servo_rate_Hz, 1000.0, 1e5);
-  s.stack = node.choice_or("stack", s.stack, {"strict", "latching", "lazy"});
+  s.stack = node.choice_or("stack", s.stack, {"strict", "latching", "lazy", "holding", "insisting"});
+  if (node.has("brake_release_s")) s.brake_release_s = node.number("brake_release_s", 0.0, 30.0);
   return s;
 }
 
@@ -215,6 +216,22 @@ std::vector<DriveFeedback> read_feedback(const YamlNode& node, const DriveDescri
   return feedback;
 }
 
+// What a drive needs to come up besides what the profile has.
+void read_bring_up(const YamlNode& node, DriveDescription& drive) {
+  if (node.has("enable_timeout_s")) drive.enable_timeout_s = node.number("enable_timeout_s", 0.5, 60.0);
+  if (!drive.on_can()) {
+    drive.word_order_tried = node.boolean_or("word_order_tried", false);
+    return;
+  }
+  drive.shows_mode_enabled = node.choice_or("mode_shown", "before", {"before", "enabled"}) == "enabled";
+  const auto is_display = [&](const DriveFeedback& more) {
+    return more.object == drive.objects.mode_display && more.bits == 8;
+  };
+  if (drive.shows_mode_enabled && std::none_of(drive.feedback.begin(), drive.feedback.end(), is_display)) {
+    throw node.error_at("mode_shown", "`feedback` with {object: \"0x6061\", bits: 8}: the cycle must see the mode");
+  }
+}
+
 DriveDescription read_drive(const YamlNode& node) {
   DriveDescription d;
   d.joint = node.string("joint");
@@ -238,6 +255,7 @@ DriveDescription read_drive(const YamlNode& node) {
     d.fd = node.boolean_or("fd", false);
     if (node.has("feedback")) d.feedback = read_feedback(node, d);
   }
+  read_bring_up(node, d);
   if (node.has("device_type")) {
     d.device_type = static_cast<std::uint32_t>(node.integer("device_type", 0, 0xffffffff));
   }
@@ -352,14 +370,16 @@ CellLimits read_limits(const YamlNode& node) {
 void check_bus(const YamlNode& node, const std::string& bus, const std::vector<BusDescription>& buses) {
   std::vector<std::string> names;
   for (const BusDescription& b : buses) names.push_back(b.name);
+  if (names.empty()) throw node.error_at("bus", "a bus of this cell: it has no buses");
   if (std::find(names.begin(), names.end(), bus) != names.end()) return;
   const std::string meant = nearest(bus, names);
   throw node.error_at("bus", "a bus of this cell: " + one_of(names), {},
                       meant.empty() ? "" : "did you mean " + in_quotes(meant) + "?");
 }
 
+// None: all drives and the sensor are on Modbus lines.
 void read_buses(const YamlNode& root, Cell& cell) {
-  for (const YamlNode& node : root.list("buses", 1, 16)) {
+  for (const YamlNode& node : root.list("buses", 0, 16)) {
     const BusDescription bus = read_bus(node);
     for (const BusDescription& other : cell.buses) {
       if (other.name == bus.name) throw node.error_at("name", "a name that no other bus of this cell has");

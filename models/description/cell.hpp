@@ -66,7 +66,9 @@ struct SimulatedDrive {
   double velocity_feedforward = 1.0;      // of the interpolated setpoint
   double acceleration_feedforward = 1.0;
   double servo_rate_Hz = 4000.0;
-  std::string stack = "strict";  // "strict", "latching", "lazy": sim/canopen/stack_behaviour.hpp
+  // "strict", "latching", "lazy", "holding", "insisting": sim/canopen/stack_behaviour.hpp
+  std::string stack = "strict";
+  std::optional<double> brake_release_s;  // from enabling to where the target is followed; none: 0.03
 };
 
 // How a drive with an incremental encoder finds its zero after power on: its own homing, CiA 402's mode 6.
@@ -112,10 +114,14 @@ struct DriveDescription {
   std::array<double, 2> range_rad{};
   double max_speed_rad_per_s = 0.0;
   double max_acceleration_rad_per_s2 = 0.0;
-  double rated_torque_Nm = 0.0;             // 6076h times the gear ratio, what 1000 in 6071h and 6077h is at the joint;
-                                            // 0: not said
-  double max_torque_Nm = 0.0;               // mode cst: what the joint may be asked for; others: what the drive has at
-                                            // the joint, which its setpoints are kept to; 0: not said
+  double rated_torque_Nm = 0.0;  // 6076h times the gear ratio, what 1000 in 6071h and 6077h is at the joint;
+                                 // 0: not said
+  double max_torque_Nm = 0.0;    // mode cst: what the joint may be asked for; others: what the drive has at
+                                 // the joint, which its setpoints are kept to; 0: not said
+  // From where operation is wanted to where it takes targets; none: the session's, 5 s.
+  std::optional<double> enable_timeout_s;
+  bool word_order_tried = false;            // modbus: somebody has seen that the file's word_order is this drive's
+  bool shows_mode_enabled = false;          // cia402: 6061h shows the mode only once operation is enabled
   std::optional<HomingDescription> homing;  // of an incremental encoder; none: an absolute one
   double rotor_inertia_kg_m2 = 0.0;         // reflected to the joint
   double position_bandwidth_Hz = 100.0;     // of the drive's position loop, as its maker or a test states it: the lag

@@ -63,13 +63,20 @@ class Reader {
     rest_.remove_prefix(length);
   }
 
-  void advance() {
-    first_in_line_ = false;
-    while (!rest_.empty() && (rest_[0] == ' ' || rest_[0] == '\t' || rest_[0] == '\r' || rest_[0] == '\n')) {
+  // Blanks, ends of lines, and comments from // to the end of a line, which some tools write.
+  void skip_blanks() {
+    for (;;) {
+      if (rest_.starts_with("//")) rest_.remove_prefix(std::min(rest_.find('\n'), rest_.size()));
+      if (rest_.empty() || (rest_[0] != ' ' && rest_[0] != '\t' && rest_[0] != '\r' && rest_[0] != '\n')) return;
       line_ += rest_[0] == '\n' ? 1 : 0;
       first_in_line_ = first_in_line_ || rest_[0] == '\n';
       rest_.remove_prefix(1);
     }
+  }
+
+  void advance() {
+    first_in_line_ = false;
+    skip_blanks();
     if (rest_.empty()) return take(Token::Kind::end, 0);
     if (rest_[0] == '"') return advance_string();
     const auto length_of = [&](auto belongs) {
@@ -155,7 +162,8 @@ class Reader {
     if (name == "BA_") read_long_name(dbc);
     if (name == "VERSION") return void(string("the version, in quotes"));
     if (name == "NS_") return skip_new_symbols();
-    if (name == "BS_" || name == "BU_") return skip_line(line);
+    if (name == "BS_") return skip_line(line);
+    if (name == "BU_") return skip_nodes(line);
     skip_section(dbc, name);
   }
 
@@ -235,6 +243,12 @@ class Reader {
       if (token_.text == "BS_" && after.starts_with(':')) return;
       advance();
     }
+  }
+
+  // Their names, on one line or on many.
+  void skip_nodes(int line) {
+    skip_line(line);
+    while (token_.kind == Token::Kind::word && !(first_in_line_ && begins_section())) advance();
   }
 
   void skip_line(int line) {

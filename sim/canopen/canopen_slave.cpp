@@ -124,7 +124,8 @@ void CanopenSlave::on_nmt_command(const fieldbus::CanFrame& frame, std::int64_t 
   if (frame.length != 2 || (frame.data[1] != 0 && frame.data[1] != config_.node)) return;
   switch (frame.data[0]) {
     case 0x01:
-      return enter(NmtState::operational, time_ns);
+      if (!refuses_start()) enter(NmtState::operational, time_ns);
+      return;
     case 0x02:
       return enter(NmtState::stopped, time_ns);
     case 0x80:
@@ -136,6 +137,10 @@ void CanopenSlave::on_nmt_command(const fieldbus::CanFrame& frame, std::int64_t 
     default:
       return;
   }
+}
+
+bool CanopenSlave::refuses_start() const noexcept {
+  return holds_nmt_start(config_.stack) && (has_error(emcy::communication) || has_error(emcy::heartbeat_lost));
 }
 
 void CanopenSlave::send_state(NmtState state, std::int64_t time_ns) noexcept {
@@ -182,9 +187,9 @@ void CanopenSlave::on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns
     return;
   }
   last_sync_ns_ = time_ns;
-  clear_error(emcy::communication, time_ns);
+  if (!insists()) clear_error(emcy::communication, time_ns);
   if (state_ == NmtState::operational) {
-    if (config_.stack == StackBehaviour::lazy) check_receive_pdos(time_ns, true, false);
+    if (is_lazy(config_.stack)) check_receive_pdos(time_ns, true, false);
     for (auto& receive : receive_) {
       if (receive->waiting) receive->pdo.unpack(receive->data);
       receive->waiting = false;
@@ -224,7 +229,7 @@ void CanopenSlave::on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& fra
     consumer.last_ns = time_ns;
     consumer.lost = false;
   }
-  if (hears_all() && !latches()) clear_error(emcy::heartbeat_lost, time_ns);
+  if (hears_all() && !latches() && !insists()) clear_error(emcy::heartbeat_lost, time_ns);
 }
 
 bool CanopenSlave::hears_all() const noexcept {
@@ -256,7 +261,7 @@ void CanopenSlave::on_time(std::int64_t time_ns) noexcept {
   }
   if (time_ns - last_sdo_ns_ > sdo_timeout) sdo_.reset();
   check_heartbeats(time_ns);
-  const bool lazy = config_.stack == StackBehaviour::lazy;
+  const bool lazy = is_lazy(config_.stack);
   if (lazy && talks()) check_sync(time_ns);
   if (state_ != NmtState::operational) return;
   check_receive_pdos(time_ns, !lazy, true);
@@ -336,6 +341,9 @@ void CanopenSlave::transmit(Transmit& pdo, const std::array<std::uint8_t, 64>& d
   const auto length = static_cast<std::size_t>(fieldbus::padded_length(pdo.pdo.length(), config_.fd));
   fieldbus::CanFrame frame = make_frame(pdo.pdo.identifier(), {data.data(), length});
   frame.fd = frame.bit_rate_switch = config_.fd;
+  port_.send(frame, time_ns);
+  if (!twin_) return;
+  frame.data[2] ^= 0x40U;  // in the position
   port_.send(frame, time_ns);
 }
 

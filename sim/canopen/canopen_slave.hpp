@@ -100,6 +100,8 @@ class CanopenSlave final : public BusDevice {
   // Faults for tests: no heartbeat leaves any more; SDO requests stay unanswered.
   void mute_heartbeat(bool mute) noexcept { heartbeat_muted_ = mute; }
   void mute_sdo(bool mute) noexcept { sdo_muted_ = mute; }
+  // Another node with the same number is on the bus: each of its transmit PDOs comes as well, with another position.
+  void add_twin(bool twin) noexcept { twin_ = twin; }
 
  private:
   static constexpr int pdos = 4;
@@ -147,6 +149,8 @@ class CanopenSlave final : public BusDevice {
   void check_receive_pdos(std::int64_t time_ns, bool synchronous, bool others);
   void check_sync(std::int64_t time_ns);
   [[nodiscard]] bool latches() const noexcept { return config_.stack == StackBehaviour::latching; }
+  [[nodiscard]] bool refuses_start() const noexcept;
+  [[nodiscard]] bool insists() const noexcept { return config_.stack == StackBehaviour::insisting; }
   [[nodiscard]] bool hears_all() const noexcept;  // no heartbeat that it watches is lost
   void transmit_events(std::int64_t time_ns) noexcept;
   void transmit_on_sync(std::int64_t time_ns) noexcept;
@@ -179,6 +183,7 @@ class CanopenSlave final : public BusDevice {
   std::int64_t last_sdo_ns_ = 0;
   bool heartbeat_muted_ = false;
   bool sdo_muted_ = false;
+  bool twin_ = false;
 };
 
 }  // namespace proxarm::sim

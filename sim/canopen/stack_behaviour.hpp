@@ -11,12 +11,24 @@
 //             (301/CO_PDO.c) looks at such an RPDO only where a SYNC came. A dead controller sends none, so the
 //             heartbeat consumer alone stops the drive. A missing SYNC is told (EMCY 8100h, after 1.5 times 1006h, in
 //             pre-operational as well, as CO_SYNC_process() does) and stops nothing.
+//   holding   lazy, and NMT start is refused while an error of the connection (8100h, 8130h) stands; SYNC and the
+//             heartbeat clear it in pre-operational, too. CANopenNode's newer versions (its pull request 220); SYNC is
+//             watched on from the session before.
+//   insisting the same, but the error stands until the communication or the node is reset: its older versions.
 #pragma once
 
 #include <cstdint>
 
 namespace proxarm::sim {
 
-enum class StackBehaviour : std::uint8_t { strict, latching, lazy };
+enum class StackBehaviour : std::uint8_t { strict, latching, lazy, holding, insisting };
+
+[[nodiscard]] constexpr bool holds_nmt_start(StackBehaviour stack) noexcept {
+  return stack == StackBehaviour::holding || stack == StackBehaviour::insisting;
+}
+// Looks at RPDO timers as a lazy one does.
+[[nodiscard]] constexpr bool is_lazy(StackBehaviour stack) noexcept {
+  return stack == StackBehaviour::lazy || holds_nmt_start(stack);
+}
 
 }  // namespace proxarm::sim

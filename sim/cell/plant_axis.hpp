@@ -31,7 +31,8 @@ class PlantAxis final : public ServoAxis {
     servo_.set_target(spoilt(target_counts, time_ns), time_ns);
   }
   void set_torque(double ratio) noexcept override {
-    servo_.set_torque_Nm(std::copysign(1.0, counts_per_rad_) * ratio * rated_torque_Nm_);
+    if (target_share_ != 0) torque_ratio_ = target_share_ * ratio;
+    servo_.set_torque_Nm(std::copysign(1.0, counts_per_rad_) * torque_ratio_ * rated_torque_Nm_);
   }
   void stop(double deceleration_counts_per_s2, std::int64_t time_ns) noexcept override {
     servo_.stop(deceleration_counts_per_s2 / std::abs(counts_per_rad_), time_ns);
@@ -60,7 +61,8 @@ class PlantAxis final : public ServoAxis {
   ServoLoop& servo_;
   double counts_per_rad_, rated_torque_Nm_, max_torque_Nm_;
   double runaway_counts_per_s_ = 0.0;
-  std::int32_t target_share_ = 1;  // of the way from since_counts_ to a target
+  std::int32_t target_share_ = 1;  // of the way from since_counts_ to a target; of a torque: 0 leaves the last one
+  double torque_ratio_ = 0.0;      // that is asked of the motor
   std::int32_t since_counts_ = 0, offset_counts_ = 0, stuck_at_counts_ = 0;
   std::int64_t since_ns_ = 0;
   bool stuck_ = false;

@@ -39,6 +39,17 @@ void take_identity(const description::EdsFile& eds, CanopenSlaveConfig& canopen)
   canopen.revision = number(eds.revision, 0x101803);
 }
 
+StackBehaviour stack_of(const std::string& name) {
+  constexpr std::pair<const char*, StackBehaviour> stacks[] = {{"latching", StackBehaviour::latching},
+                                                               {"lazy", StackBehaviour::lazy},
+                                                               {"holding", StackBehaviour::holding},
+                                                               {"insisting", StackBehaviour::insisting}};
+  for (const auto& [known, stack] : stacks) {
+    if (name == known) return stack;
+  }
+  return StackBehaviour::strict;
+}
+
 DriveDeviceConfig drive_config(const description::DriveDescription& drive, const description::EdsFile* eds,
                                const SimulatedCellConfig& config) {
   DriveDeviceConfig c;
@@ -49,9 +60,7 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   c.canopen.device_type =
       drive.device_type.value_or(type == nullptr ? servo_drive : type->default_value.value_or(servo_drive));
   c.canopen.serial = drive.node;
-  c.canopen.stack = drive.simulation.stack == "latching" ? StackBehaviour::latching
-                    : drive.simulation.stack == "lazy"   ? StackBehaviour::lazy
-                                                         : StackBehaviour::strict;
+  c.canopen.stack = stack_of(drive.simulation.stack);
   c.canopen.revision = 0x00010000;
   c.canopen.device_name = "simulated drive of " + drive.joint;
   c.canopen.boot_time_ns = config.drive_boot_time_ns;
@@ -70,6 +79,7 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   c.position_min = to_i32(std::min(first, second));
   c.position_max = to_i32(std::max(first, second));
   c.brake_release_ns = config.brake_release_ns;
+  if (drive.simulation.brake_release_s) c.brake_release_ns = std::llround(1e9 * *drive.simulation.brake_release_s);
   if (drive.homing) {
     const double home = drive.offset_counts + drive.homing->angle_rad * drive.counts_per_rad();
     c.incremental = {.home_counts = to_i32(home)};
@@ -81,10 +91,11 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   return c;
 }
 
-// A drive that lacks an object, or has it read-only.
+// A drive that lacks an object, has it read-only, or takes no value for it.
 void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
   const bool is_missing = fault.kind == DeviceFaultKind::object_missing;
-  if (!is_missing && fault.kind != DeviceFaultKind::object_fixed) return;
+  const bool is_refused = fault.kind == DeviceFaultKind::value_refused;
+  if (!is_missing && !is_refused && fault.kind != DeviceFaultKind::object_fixed) return;
   ObjectEntry* entry =
       dictionary.find(static_cast<std::uint16_t>(fault.value >> 8), static_cast<std::uint8_t>(fault.value));
   if (entry == nullptr) {
@@ -94,6 +105,8 @@ void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
   }
   if (is_missing) {
     entry->hidden = true;
+  } else if (is_refused) {
+    entry->before_write = [](std::int64_t) { return SdoAbort::invalid_value; };
   } else {
     entry->access = Access::read_only;
   }
@@ -220,7 +233,9 @@ void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& confi
     token.default_value = token.value;
   }
   for (const DeviceFault& fault : faults_) {
-    if (fault.device == drive.joint) make_otherwise(fault, drives_[axis]->canopen().dictionary());
+    if (fault.device != drive.joint) continue;
+    make_otherwise(fault, drives_[axis]->canopen().dictionary());
+    if (fault.kind == DeviceFaultKind::mode_late) drives_[axis]->show_mode_late(true);
   }
 }
 

@@ -41,6 +41,15 @@ void require_fault_of_sensor(const DeviceFault& fault, const description::Sensor
   }
 }
 
+// Torques have no way from which a drive could run off.
+void require_fault_of_mode(const DeviceFault& fault, const description::DriveDescription& drive) {
+  if (fault.kind != DeviceFaultKind::runaway || drive.mode != "cst") return;
+  throw SetupError({.key = "--fault",
+                    .found = "runaway for " + drive.joint + ", whose drive takes torques (mode cst)",
+                    .expected = "a fault of what it does with a torque: reversed (the other sign) or ignored (the last "
+                                "one acts on)"});
+}
+
 }  // namespace
 
 void SimulatedCell::check_faults(const description::SensorDescription& sensor) const {
@@ -51,6 +60,7 @@ void SimulatedCell::check_faults(const description::SensorDescription& sensor) c
         require_fault_of_sensor(fault, sensor);
       } else {
         require_known_fault(fault, modbus_drives_[axis] ? FaultyDevice::modbus_drive : FaultyDevice::can_drive);
+        require_fault_of_mode(fault, cell_.drives[axis]);
       }
       continue;
     }
@@ -104,6 +114,14 @@ void SimulatedCell::set_drive_fault(std::size_t axis, const DeviceFault& fault, 
       return drives_[axis]->canopen().mute_sdo(on);
     case DeviceFaultKind::period_fixed:
       return drives_[axis]->fix_period_while_enabled(on);
+    case DeviceFaultKind::sto_open:
+      return drives_[axis]->open_sto(on);
+    case DeviceFaultKind::bit_12_missing:
+      return drives_[axis]->never_say_following(on);
+    case DeviceFaultKind::mode_changed:
+      return drives_[axis]->show_mode(on ? std::optional(static_cast<std::int8_t>(fault.value)) : std::nullopt);
+    case DeviceFaultKind::twin:
+      return drives_[axis]->canopen().add_twin(on);
     case DeviceFaultKind::power_loss:
       if (on) plant_.servo(axis).disable();
       return nodes_[node_of_axis_[axis]]->set_power(!on, time_ns);
@@ -126,6 +144,9 @@ void SimulatedCell::set_modbus_fault(std::size_t axis, const DeviceFault& fault,
       break;
     case DeviceFaultKind::modbus_exception:
       kind = ModbusFault::exception;
+      break;
+    case DeviceFaultKind::modbus_busy:
+      kind = ModbusFault::busy;
       break;
     case DeviceFaultKind::modbus_closed:
       kind = ModbusFault::closed;

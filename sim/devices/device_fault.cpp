@@ -14,7 +14,7 @@ namespace {
 using description::SetupError;
 
 constexpr unsigned can = 1, modbus = 2, drives = can | modbus, sensor = 4;  // FaultyDevice
-constexpr std::uint64_t none = 0, u16 = 0xFFFF, u24 = 0xFFFFFF, u32 = 0xFFFFFFFF, last_channel = 5;
+constexpr std::uint64_t none = 0, u16 = 0xFFFF, u24 = 0xFFFFFF, u32 = 0xFFFFFFFF, last_channel = 5, last_mode = 10;
 using ParseAmount = double (*)(std::string_view text, std::string_view option);
 
 struct KindName {
@@ -32,10 +32,16 @@ constexpr KindName kinds[] = {
     {"device_type", can, DeviceFaultKind::device_type, u32},
     {"lacks", can, DeviceFaultKind::object_missing, u24},
     {"fixed", can, DeviceFaultKind::object_fixed, u24},
+    {"refuses", can, DeviceFaultKind::value_refused, u24},
+    {"mode_late", can, DeviceFaultKind::mode_late, none},
     {"homed", can, DeviceFaultKind::homed, none},
     {"heartbeat", can, DeviceFaultKind::heartbeat_lost, none},
     {"sdo", can, DeviceFaultKind::sdo_silent, none},
     {"period", can, DeviceFaultKind::period_fixed, none},
+    {"sto", can, DeviceFaultKind::sto_open, none},
+    {"bit12", can, DeviceFaultKind::bit_12_missing, none},
+    {"mode", can, DeviceFaultKind::mode_changed, last_mode},
+    {"twin", can, DeviceFaultKind::twin, none},
     {"power", drives, DeviceFaultKind::power_loss, none},
     {"jammed", drives, DeviceFaultKind::jammed, none},
     {"runaway", drives, DeviceFaultKind::runaway, none, description::parse_angular_speed, true},
@@ -45,6 +51,7 @@ constexpr KindName kinds[] = {
     {"offset", drives, DeviceFaultKind::offset, none, description::parse_angle, true},
     {"stuck", drives, DeviceFaultKind::stuck, none},
     {"exception", modbus, DeviceFaultKind::modbus_exception, none},
+    {"busy", modbus, DeviceFaultKind::modbus_busy, none},
     {"closed", modbus, DeviceFaultKind::modbus_closed, none},
     {"wrong_unit", modbus, DeviceFaultKind::modbus_wrong_unit, none},
     {"half_answer", modbus, DeviceFaultKind::modbus_half, none},
@@ -145,8 +152,9 @@ DeviceFault parse_device_fault(std::string_view text) {
     fault.value = parse_value(all, what.substr(equals + 1), found->most);
   }
   if (at == std::string_view::npos) return fault;
-  constexpr DeviceFaultKind made_so[] = {DeviceFaultKind::device_type, DeviceFaultKind::object_missing,
-                                         DeviceFaultKind::object_fixed, DeviceFaultKind::homed};
+  constexpr DeviceFaultKind made_so[] = {DeviceFaultKind::device_type,  DeviceFaultKind::object_missing,
+                                         DeviceFaultKind::object_fixed, DeviceFaultKind::value_refused,
+                                         DeviceFaultKind::mode_late,    DeviceFaultKind::homed};
   if (std::find(std::begin(made_so), std::end(made_so), fault.kind) != std::end(made_so))
     refuse(all, "no time: a device is what it is from the start");
   const std::size_t dots = times.find("..");

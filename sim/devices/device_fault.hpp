@@ -24,10 +24,16 @@ enum class DeviceFaultKind : std::uint8_t {
   device_type,     // "device_type": 1000h is VALUE; always, no times
   object_missing,  // "lacks": it has no object VALUE (index << 8 | sub-index); always, no times
   object_fixed,    // "fixed": object VALUE can't be written; always, no times
+  value_refused,   // "refuses": writing object VALUE is aborted by its value (0609 0030h); always, no times
+  mode_late,       // "mode_late": 6061h shows the mode only once operation is enabled; always, no times
   homed,           // "homed": with an incremental encoder, it was homed before; always, no times
   heartbeat_lost,  // "heartbeat": no heartbeat leaves
   sdo_silent,      // "sdo": SDO requests stay unanswered
   period_fixed,    // "period": refuses another 60C2h while operation is enabled
+  sto_open,        // "sto": STO is open, so it stays in "switch on disabled"
+  bit_12_missing,  // "bit12": never says that it follows its targets
+  mode_changed,    // "mode": 6061h shows mode VALUE
+  twin,            // "twin": another node with the same number answers each SYNC, too
   power_loss,      // "power": off, and on again at the end
   jammed,          // "jammed": the motor can't turn
   runaway,         // "runaway": goes off from its setpoints at AMOUNT rad/s
@@ -36,8 +42,10 @@ enum class DeviceFaultKind : std::uint8_t {
   weak,            // "weak": its motor gives no more than AMOUNT Nm, at the joint
   offset,          // "offset": the position that it reports is AMOUNT rad too large
   stuck,           // "stuck": it reports one position whatever it does
+  // Those that spoil a position's way (runaway) are no fault of a drive that takes torques.
   // Drives on a Modbus line, which know "silent", "power", "jammed" and what follows that as well
   modbus_exception,   // "exception": each request is answered by exception 04
+  modbus_busy,        // "busy": each request is answered by exception 06
   modbus_closed,      // "closed": the connection is closed
   modbus_wrong_unit,  // "wrong_unit": its answers bear the next unit's number
   modbus_half,        // "half_answer": its answers end in the middle

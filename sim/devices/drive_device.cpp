@@ -55,7 +55,7 @@ void DriveDevice::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns
 
 void DriveDevice::on_time(std::int64_t time_ns) noexcept {
   now_ns_ = time_ns;
-  mode_display_->set(mode_->number());
+  show_mode();
   supervise_sync();
   supervise_following_error();
   if (stopping_ && axis_.at_rest()) finish_stop();
@@ -296,12 +296,23 @@ std::uint16_t DriveDevice::statusword() const noexcept {
     if (homing_ == HomingState::failed) word |= 0x2000u;
     return static_cast<std::uint16_t>(word);
   }
-  if (following_ && state_ == DriveState::operation_enabled) word |= 0x1000u;
+  if (following_ && !never_following_ && state_ == DriveState::operation_enabled) word |= 0x1000u;
   if (following_error_since_ns_ != never) word |= 0x2000u;
   return static_cast<std::uint16_t>(word);
 }
 
 // ---- State machine
+
+void DriveDevice::show_mode() noexcept {
+  const bool hidden = shows_mode_late_ && state_ != DriveState::operation_enabled;
+  mode_display_->set(shown_mode_ ? *shown_mode_ : hidden ? 0 : mode_->number());
+}
+
+void DriveDevice::open_sto(bool open) noexcept {
+  sto_open_ = open;
+  const bool above = state_ != DriveState::not_ready_to_switch_on && state_ != DriveState::fault;
+  if (open && above && state_ != DriveState::switch_on_disabled) enter(DriveState::switch_on_disabled, 9);
+}
 
 void DriveDevice::on_controlword() {
   const auto word = static_cast<std::uint16_t>(controlword_->number());
@@ -313,6 +324,7 @@ void DriveDevice::on_controlword() {
     if (state_ == DriveState::fault_reaction_active) return enter(DriveState::fault, 14);
   }
   if (stopping_) return;
+  if (sto_open_ && command != DriveCommand::fault_reset) return;
   for (int step = 0; step < 2; ++step) {  // 3 and 4 in one go when operation is commanded at once
     const DriveTransition transition = transition_for(state_, command);
     if (transition.number == 0) break;
@@ -401,7 +413,7 @@ void DriveDevice::finish_stop() { enter(after_stop_, after_stop_transition_); }
 
 RefusalReason DriveDevice::refusal() const noexcept {
   if (slave_.state() != NmtState::operational) return RefusalReason::not_operational;
-  const std::int64_t mode = mode_display_->number();
+  const std::int64_t mode = (shows_mode_late_ ? mode_ : mode_display_)->number();
   if (mode == homing_mode && incremental_) return RefusalReason::none;
   if (!is_cyclic(mode)) return RefusalReason::mode_not_displayed;
   if (period_ns_ <= 0) return RefusalReason::interpolation_period_not_set;
@@ -451,7 +463,7 @@ void DriveDevice::inject_fault(std::uint16_t code, std::int64_t time_ns) noexcep
 
 void DriveDevice::supervise_sync() {
   const std::int64_t tolerance = sync_tolerance_->number();
-  const bool lazy = slave_.config().stack == StackBehaviour::lazy;
+  const bool lazy = is_lazy(slave_.config().stack);
   if (state_ != DriveState::operation_enabled || lazy || homes() || tolerance == 0 || last_sync_ns_ == never) return;
   if (now_ns_ - last_sync_ns_ > tolerance * period_ns_) trip(emcy::sync_controller, error_register::communication);
 }

@@ -80,6 +80,13 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void inject_fault(std::uint16_t code, std::int64_t time_ns) noexcept;
   // 60C2h may be written while operation is enabled; a drive that is made otherwise refuses (08000022h).
   void fix_period_while_enabled(bool fixed) noexcept { period_fixed_ = fixed; }
+  // STO is open: no power, and "switch on disabled" is left by no command.
+  void open_sto(bool open) noexcept;
+  // 6061h shows the mode only while operation is enabled; statusword bit 12 never comes; 6061h shows `mode`, whatever
+  // 6060h says.
+  void show_mode_late(bool late) noexcept { shows_mode_late_ = late; }
+  void never_say_following(bool on) noexcept { never_following_ = on; }
+  void show_mode(std::optional<std::int8_t> mode) noexcept { shown_mode_ = mode; }
   // 60FDh, of what is wired to it.
   void set_digital_inputs(std::uint32_t bits) noexcept { digital_inputs_->set(bits); }
 
@@ -124,6 +131,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void supervise_sync();
   void supervise_following_error();
   void publish() noexcept;
+  void show_mode() noexcept;
 
   CanopenSlave slave_;
   ServoAxis& axis_;
@@ -152,6 +160,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   std::uint16_t controlword_before_ = 0;
   bool powered_ = false;
   bool period_fixed_ = false;
+  bool sto_open_ = false, shows_mode_late_ = false, never_following_ = false;
+  std::optional<std::int8_t> shown_mode_;
   std::int64_t brake_open_ns_ = 0;
   bool stopping_ = false;  // on a ramp that ends in after_stop_
   DriveState after_stop_ = DriveState::switch_on_disabled;

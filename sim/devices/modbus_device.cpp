@@ -58,6 +58,7 @@ std::vector<std::uint8_t> ModbusDevice::serve(std::span<const std::uint8_t> requ
   if (request.size() < 2) return {};
   if (fault_ == ModbusFault::silent || fault_ == ModbusFault::closed) return {};
   if (fault_ == ModbusFault::exception) return exception(request, device_failure);
+  if (fault_ == ModbusFault::busy) return exception(request, device_busy);
   std::vector<std::uint8_t> answer = answer_to(request);
   if (fault_ == ModbusFault::wrong_unit) ++answer[0];
   if (fault_ == ModbusFault::half) answer.resize(answer.size() / 2);

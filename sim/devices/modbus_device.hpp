@@ -20,12 +20,14 @@
 namespace proxarm::sim {
 
 // Exception codes of a Modbus server.
-inline constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal_value = 3, device_failure = 4;
+inline constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal_value = 3, device_failure = 4,
+                              device_busy = 6;
 
 // What may be wrong with its answers.
 enum class ModbusFault : std::uint8_t {
   none,
   exception,   // 04, server device failure
+  busy,        // 06, server device busy
   silent,      // no answer
   closed,      // the connection is closed
   wrong_unit,  // the answer bears the next unit's number

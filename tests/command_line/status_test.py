@@ -1,6 +1,8 @@
 """`proxarm status`: how a running session is."""
 import json
 import os
+import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -57,6 +59,35 @@ class Status(unittest.TestCase):
             watch.stdout.read()
             self.assertEqual(watch.wait(timeout=60), 0, "a watch ends with its session")
         finally:
+            run.kill()
+            run.wait()
+
+    def test_a_suspended_session_is_said_to_be_one_and_keeps_nobody_waiting(self):
+        run = subprocess.Popen([PROGRAM, "run", "--control", self.control, "--pace", "realtime", "--duration", "60s",
+                                "--no-plot"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        waiting = []
+        try:
+            until = time.monotonic() + 60
+            while status(self.control).returncode != 0:
+                self.assertLess(time.monotonic(), until)
+                time.sleep(0.1)
+            run.send_signal(signal.SIGSTOP)
+            # As many as its queue holds, and more: connecting would wait, too.
+            for _ in range(200):
+                waiting.append(socket.socket(socket.AF_UNIX))
+                waiting[-1].setblocking(False)
+                waiting[-1].connect_ex(self.control)
+                if len(waiting) not in (1, 200):
+                    continue
+                begun = time.monotonic()
+                answer = status(self.control)
+                self.assertEqual(answer.returncode, 2)
+                self.assertIn("found no answer", answer.stderr)
+                self.assertIn("is the session suspended", answer.stderr)
+                self.assertLess(time.monotonic() - begun, 3.0)
+        finally:
+            for one in waiting:
+                one.close()
             run.kill()
             run.wait()
 

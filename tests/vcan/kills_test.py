@@ -1,6 +1,6 @@
 """Controllers that end well, by a fault and by SIGKILL, again and again, with drives whose stacks watch in different ways.
 
-The bench on one interface, `simulation: {stack: strict, latching or lazy}`. After each SIGKILL at a random moment of
+The bench on one interface, `simulation: {stack: strict, latching, lazy, holding or insisting}`. After each SIGKILL at a random moment of
 rendering every drive must fault within what the cell promises (`supervision.bus_loss_stop_s`, 60 ms); a clean end, and
 one by a fault, must leave no EMCY; the next controller must come up each time. Times are candump's, from the last SYNC on.
 """
@@ -26,6 +26,8 @@ ALIEN = bytes([0x10, 0x42])  # 4210h, device temperature: what this test says in
 
 
 class Kills(two.VcanTestCase):
+    begins_s = 0.8  # from a controller's start to where it surely renders
+
     def cell(self, stack):
         text = re.sub(r"(\n +simulation:\n)( +)", rf"\1\2stack: {stack}\n\2", (CELLS / "bench.yaml").read_text())
         for path in ("../arms", "../sensors", "../../scenes", "../../sim"):
@@ -39,7 +41,7 @@ class Kills(two.VcanTestCase):
         """From the last SYNC to the EMCY by which each drive stops."""
         with two.candump("vcan0") as witness:
             with two.controller("vcan0", "60s", None, cell) as run:
-                time.sleep(chance.uniform(0.8, 2.5))
+                time.sleep(self.begins_s + chance.uniform(0.0, 1.7))
                 run.send(signal.SIGKILL)
                 self.assertEqual(run.wait(), -signal.SIGKILL, run.errors() + run.output())
             time.sleep(0.2)
@@ -71,7 +73,7 @@ class Kills(two.VcanTestCase):
         """By an EMCY in a drive's name that it never sent: the controller ends, the drives have nothing to say."""
         with two.candump("vcan0") as witness:
             with two.controller("vcan0", "60s", None, cell) as run:
-                time.sleep(0.8)
+                time.sleep(self.begins_s)
                 data = (ALIEN + bytes([0x01])).hex().upper().ljust(16, "0")
                 subprocess.run(["cansend", "vcan0", f"{two.EMCY + node:03X}#{data}"], check=True)
                 self.assertEqual(run.wait(), 1, run.errors() + run.output())
@@ -101,6 +103,15 @@ class Kills(two.VcanTestCase):
 
     def test_lazy_drives_stop_by_the_heartbeat(self):
         self.assert_stops("lazy", HEARTBEAT_LOST, PROMISED_US + SLACK_US)
+
+    # Drives that hold NMT back are helped before they start.
+    def test_holding_drives_are_started_by_the_next_controller(self):
+        self.begins_s = 2.0
+        self.assert_stops("holding", HEARTBEAT_LOST, PROMISED_US + SLACK_US)
+
+    def test_insisting_drives_are_started_by_the_next_controller(self):
+        self.begins_s = 2.0
+        self.assert_stops("insisting", HEARTBEAT_LOST, PROMISED_US + SLACK_US)
 
 
 if __name__ == "__main__":

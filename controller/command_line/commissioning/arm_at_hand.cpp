@@ -62,8 +62,7 @@ controller::CycleParts ArmOnInterfaces::brought_up(const PreparedSession& sessio
   controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
                                                          indices_in(network, interfaces.size()),
                                                          controller::opener_of(fieldbus::ModbusPeers::any));
-  set_filters(network, parts);
-  bring_up_devices(parts);
+  bring_up_devices(network, parts);
   return parts;
 }
 

@@ -78,14 +78,13 @@ Outcome on_interfaces(const PreparedSession& session, const RunOptions& options)
   scenes::CompiledScene scene = scenes::compile(session.scene);
   controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings,
                                                          arm.network, indices_in(arm.network, arm.interfaces.size()));
-  set_filters(arm.network, parts, [&](std::size_t bus) {
+  bring_up_devices(arm.network, parts, [&](std::size_t bus) {
     std::vector<std::uint32_t> ids;
     for (const fieldbus::DriveSlot& slot : parts.can_drives) {
       if (slot.bus == bus) ids.push_back(fieldbus::SilenceWatch(*slot.drive).wanted_id());
     }
     return ids;
   });
-  bring_up_devices(parts);
   fieldbus::ask_for_words(arm.network, parts.can_drives);
   proof::BusLossSession silence(std::move(parts), session.settings, session.cell);
   SignalWatch signals([&] { silence.request_stop(); });

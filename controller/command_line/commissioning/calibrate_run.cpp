@@ -14,7 +14,6 @@
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/interface_network.hpp"
 #include "controller/supervision/enabling_input.hpp"
-#include "fieldbus/canopen/canopen_sync.hpp"
 #include "fieldbus/cia402/homing.hpp"
 #include "models/arm/arm.hpp"
 #include "models/base/setup_error.hpp"
@@ -62,14 +61,17 @@ void listen(fieldbus::CanNetwork& network, std::int64_t time_ns, const fieldbus:
   });
 }
 
-// Somebody runs this bus: it is his.
-void refuse_foreign_sync(fieldbus::CanNetwork& network) {
-  bool sync = false;
-  listen(network, listen_ns, [&](std::size_t, const fieldbus::TimedFrame& received) {
-    sync = sync || (received.frame.id == fieldbus::sync_id && !received.frame.extended);
-  });
-  if (sync) {
-    throw SetupError({.message = "calibrate", .found = "a SYNC on the bus", .expected = "a bus without a session"});
+// What the drives answer, and the enabling input's messages where it is one on a bus.
+void pass_answers(fieldbus::SocketCanNetwork& network, const Slots& slots,
+                  const std::optional<controller::EnablingInput>& enabling) {
+  for (std::size_t bus = 0; bus < network.bus_count(); ++bus) {
+    std::vector<std::uint32_t> ids;
+    for (const fieldbus::DriveSlot& slot : slots) {
+      const auto wanted = slot.drive->wanted_ids();
+      if (slot.bus == bus) ids.insert(ids.end(), wanted.begin(), wanted.end());
+    }
+    if (enabling && enabling->bus() == bus) ids.push_back(enabling->wanted_id());
+    pass_only(network, bus, ids);
   }
 }
 
@@ -115,6 +117,16 @@ void ask_for_pose(const description::Cell& cell, const std::vector<double>& angl
   }
 }
 
+// The switch of the person beside the arm, where the cell has one that is a message on a bus.
+std::optional<controller::EnablingInput> enabling_message(const PreparedSession& session,
+                                                          const controller::BusIndices& indices) {
+  const auto& input = session.cell.enabling_input;
+  if (!input || session.settings.without_enabling_input || !input->drive.empty()) return std::nullopt;
+  std::size_t bus = 0;
+  while (session.cell.buses[bus].name != input->bus) ++bus;
+  return controller::EnablingInput(*input, session.cell, indices[bus]);
+}
+
 class Interfaces {
  public:
   Interfaces(const PreparedSession& session, const RunOptions& options)
@@ -122,7 +134,12 @@ class Interfaces {
         network_(open_network(names_)),
         drives_(session.cell, indices_in(network_, names_.size())) {
     require_nodes_apart(session, names_);
-    refuse_foreign_sync(network_);
+    listen(session);
+  }
+  // Before drives are asked, each time that somebody was waited for: another session may have begun.
+  void listen(const PreparedSession& session) {
+    listen_before_speaking(network_, drives_.slots());
+    pass_answers(network_, drives_.slots(), enabling_message(session, indices_in(network_, names_.size())));
   }
   [[nodiscard]] const std::vector<std::string>& names() const noexcept { return names_; }
   [[nodiscard]] fieldbus::SocketCanNetwork& network() noexcept { return network_; }
@@ -150,6 +167,7 @@ std::vector<MarkedPose> marked_poses(const PreparedSession& session, const Prepa
       continue;
     }
     ask_for_pose(session.cell, angle_rad);
+    interfaces->listen(session);
     poses.push_back({motor_angles(session.cell, angle_rad), read_counts(interfaces->network(), interfaces->slots())});
   }
   return poses;
@@ -191,7 +209,6 @@ int keep(const description::Cell& cell, const std::vector<std::int32_t>& offsets
   return 0;
 }
 
-// The switch of the person beside the arm, where the cell has one that is a message on a bus.
 class Permission {
  public:
   Permission(const PreparedSession& session, const controller::BusIndices& indices) {
@@ -204,9 +221,7 @@ class Permission {
                         .expected = "a message on a bus: while drives are homed none sends its inputs",
                         .advice = "or --without-enabling-input, on your own responsibility"});
     }
-    std::size_t bus = 0;
-    while (session.cell.buses[bus].name != input->bus) ++bus;
-    input_.emplace(*input, session.cell, indices[bus]);
+    input_ = enabling_message(session, indices);
   }
   void on_frame(std::size_t bus, const fieldbus::TimedFrame& received) {
     if (input_) input_->on_frame(bus, received.frame, received.time_ns);
@@ -270,6 +285,7 @@ int home(const PreparedSession& session, const PreparedSession& arm, const Calib
   } else {
     Interfaces interfaces(session, options.run);
     require_hardware_consent(session, options.run, interfaces.names());
+    interfaces.listen(session);
     Permission permission(session, indices_in(interfaces.network(), interfaces.names().size()));
     SignalWatch signals([&] { permission.withdraw(); });
     home_all(interfaces.network(), interfaces.slots(), permission);

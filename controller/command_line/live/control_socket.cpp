@@ -46,7 +46,8 @@ constexpr auto patience = std::chrono::seconds(2);  // with somebody who connect
 constexpr auto retry_after =
     std::chrono::milliseconds(10);  // what keeps accept from succeeding lasts longer than a call
 constexpr auto time_for_a_line = std::chrono::milliseconds(50);  // from connecting, where descriptors are scarce
-constexpr int answer_within_ms = 5000;  // of a session that is alive; changes take some milliseconds
+// Of a session that is alive: orders and a status take some milliseconds, changes are judged, which may take longer.
+constexpr int answer_within_ms = 5000, status_within_ms = 1000;
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& found, const std::string& expected) {
   throw SetupError({.file = path.string(), .key = "--control", .found = found, .expected = expected});
@@ -285,6 +286,21 @@ ControlSocket::~ControlSocket() {
 
 void require_control_path(const fs::path& path) { (void)claim(fs::absolute(path)); }
 
+namespace {
+
+SetupError no_answer(const fs::path& path, int within_ms) {
+  const std::string waited = within_ms == 0 ? "" : " within " + std::to_string(within_ms / 1000) + " s";
+  return SetupError({.file = path.string(),
+                     .key = "--control",
+                     .found = "no answer" + waited,
+                     .expected = "one",
+                     .advice =
+                         "is the session suspended (Ctrl-Z, a debugger), or flooded by others? Its drives stop by "
+                         "themselves while it stands"});
+}
+
+}  // namespace
+
 std::string ask_control_socket(const fs::path& path, const std::string& line) {
   if (line.size() + 1 > longest_line || line.find('\n') != std::string::npos) {
     throw SetupError({.found = description::in_quotes(line.substr(0, 40)), .expected = "NAME=VALUE"});
@@ -292,7 +308,10 @@ std::string ask_control_socket(const fs::path& path, const std::string& line) {
   boost::asio::io_context context;
   stream_protocol::socket socket(context);
   error_code error;
+  socket.open();
+  socket.non_blocking(true);  // a suspended session accepts nobody: its queue fills, and connecting would wait
   socket.connect(endpoint_of(fs::absolute(path)), error);
+  if (error == boost::asio::error::would_block || error == boost::asio::error::try_again) throw no_answer(path, 0);
   if (error) {
     const bool nobody = error == boost::asio::error::connection_refused;
     const bool nothing = error == boost::system::errc::no_such_file_or_directory;
@@ -304,19 +323,15 @@ std::string ask_control_socket(const fs::path& path, const std::string& line) {
                       .expected = "a session that listens there",
                       .advice = "start it with `proxarm run --control " + path.string() + "`"});
   }
+  socket.non_blocking(false);
   boost::asio::write(socket, boost::asio::buffer(line + "\n"), error);
+  const int within_ms = line.starts_with("status") ? status_within_ms : answer_within_ms;
   pollfd answered{socket.native_handle(), POLLIN, 0};
   boost::asio::streambuf answer;
-  if (poll(&answered, 1, answer_within_ms) == 1) boost::asio::read_until(socket, answer, '\n', error);
+  if (poll(&answered, 1, within_ms) == 1) boost::asio::read_until(socket, answer, '\n', error);
   std::istream in(&answer);
   std::string text;
-  if (!std::getline(in, text)) {
-    throw SetupError({.file = path.string(),
-                      .key = "--control",
-                      .found = "no answer",
-                      .expected = "one",
-                      .advice = "is the session suspended, or flooded by others?"});
-  }
+  if (!std::getline(in, text)) throw no_answer(path, within_ms);
   return text;
 }
 

@@ -49,7 +49,8 @@ std::vector<std::string> names_in(fieldbus::CanNetwork& network) {
 
 // Bitrates by bus of the network: the slowest of the cell's buses that share an interface.
 std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const controller::BusIndices& indices) {
-  std::vector<fieldbus::BitRates> rates(*std::max_element(indices.begin(), indices.end()) + 1, {0, 0});
+  const std::size_t buses = indices.empty() ? 0 : *std::max_element(indices.begin(), indices.end()) + 1;
+  std::vector<fieldbus::BitRates> rates(buses, {0, 0});
   for (std::size_t i = 0; i < indices.size(); ++i) {
     fieldbus::BitRates& shared = rates[indices[i]];
     if (shared.nominal == 0 || cell.buses[i].bitrate < shared.nominal) {
@@ -164,7 +165,6 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   controller::CycleParts parts =
       controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices,
                               controller::opener_of(fieldbus::ModbusPeers::any));  // consent was given above
-  set_filters(network, parts);
   SessionOutput output(session, options, false);
   std::unique_ptr<controller::ReplayRecorder> replay;
   std::unique_ptr<RecordedMessages> messages;
@@ -173,7 +173,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
     messages = std::make_unique<RecordedMessages>(options.record_dir, session);
   }
   keeper.set_head(replay_head(session, names_in(tap), indices));
-  bring_up_devices(parts);
+  bring_up_devices(network, parts);
   report_modbus_rates(session, parts);
 
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <set>
 #include <utility>
@@ -24,6 +25,7 @@ class TableNode {
   // To be called for every frame that the master sends.
   void on_frame(const CanFrame& f) {
     if (!powered) return;
+    if (freed_by && freed_by(f)) starts = true;
     if (f.id == 0 && (f.data[1] == node_ || f.data[1] == 0)) return on_nmt(f.data[0]);
     if (f.id != 0x600U + node_ || f.length != 8) return;
     const Key key{f.data[1] | f.data[2] << 8, f.data[3]};
@@ -38,6 +40,7 @@ class TableNode {
     std::uint32_t abort = entry == objects.end() ? 0x06020000 : 0;
     const bool write = f.data[0] >> 5 == 1;
     if (aborts.count(key) != 0) abort = aborts[key];
+    if (write && write_aborts.count(key) != 0) abort = write_aborts[key];
     if (abort == 0 && write) {
       const int bytes = 4 - (f.data[0] >> 2 & 3);
       if (bytes != entry->second.bytes) abort = 0x06070010;
@@ -70,7 +73,8 @@ class TableNode {
 
   // What a servo drive has, with values other than those the master wants.
   static std::map<Key, Entry> servo_drive() {
-    std::map<Key, Entry> od = {{{0x1000, 0}, {4, 0x00020192}}, {{0x1006, 0}, {4, 0}},     {{0x1016, 1}, {4, 0}},
+    std::map<Key, Entry> od = {{{0x1000, 0}, {4, 0x00020192}}, {{0x1001, 0}, {1, 0}},     {{0x1003, 1}, {4, 0}},
+                               {{0x6040, 0}, {2, 0}},          {{0x1006, 0}, {4, 0}},     {{0x1016, 1}, {4, 0}},
                                {{0x1017, 0}, {2, 0}},          {{0x1018, 1}, {4, 0x2E1}}, {{0x1018, 2}, {4, 0x1234}},
                                {{0x1018, 3}, {4, 0x10002}},    {{0x1018, 4}, {4, 77}},    {{0x1029, 1}, {1, 1}},
                                {{0x6007, 0}, {2, 1}},          {{0x605A, 0}, {2, 1}},     {{0x605B, 0}, {2, 0}},
@@ -88,20 +92,33 @@ class TableNode {
   }
 
   std::map<Key, Entry> objects = servo_drive();
-  std::map<Key, std::uint32_t> aborts;  // answered by this code
-  std::set<Key> deaf;                   // written without an error, but not kept
+  std::map<Key, std::uint32_t> aborts;        // answered by this code
+  std::map<Key, std::uint32_t> write_aborts;  // the same, but can be read
+  std::set<Key> deaf;                         // written without an error, but not kept
   std::vector<Key> written;
   bool powered = true;
   bool mode_follows = true;
   bool starts = true;
-  int ignored = 0;  // that many requests aren't answered
+  std::function<bool(const CanFrame&)> freed_by;  // the frame from which on it starts
+  int ignored = 0;                                // that many requests aren't answered
   std::uint8_t state = 0x7F;
+  int resets = 0;  // of its communication
 
  private:
   void on_nmt(std::uint8_t command) {
     if (command == 0x01 && starts) state = 0x05;
     if (command == 0x02) state = 0x04;
     if (command == 0x80) state = 0x7F;
+    if (command == 0x82) {
+      ++resets;
+      for (auto& [key, entry] : servo_drive()) objects[key] = entry;
+      objects[{0x1001, 0}].value = 0;
+      CanFrame boot_up;
+      boot_up.id = 0x700U + node_;
+      boot_up.length = 1;
+      bus_.arrive(boot_up, 5'000'000);
+      state = 0x7F;
+    }
     if (objects[{0x1017, 0}].value > 0) heartbeat();
   }
 

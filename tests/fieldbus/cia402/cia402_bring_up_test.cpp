@@ -45,12 +45,23 @@ struct Cia402BringUpTest : ::testing::Test {
     };
     network.bus(1).on_send = [this](const CanFrame& frame) { three.on_frame(frame); };
   }
-  std::vector<DriveIdentity> bring_up(const FrameHandler& other = {}) {
+  std::vector<DriveIdentity> bring_up(const FrameHandler& other = {}, const Tell& tell = {}) {
     drives = {ServoDrive(describe_drive("axis_1", "axes_1_2", 1), settings),
               ServoDrive(describe_drive("axis_2", "axes_1_2", 2), settings),
               ServoDrive(describe_drive("axis_3", "axes_3", 3), settings)};
     slots = {{&drives[0], 0}, {&drives[1], 0}, {&drives[2], 1}};
-    return bring_up_drives(network, slots, other);
+    return bring_up_drives(network, slots, other, tell);
+  }
+  // Axis 3 keeps an error of the session before, and NMT start waits for `frees`. What was told of it.
+  std::vector<std::string> told_of_a_held_drive(const std::function<bool(const CanFrame&)>& frees) {
+    three.starts = false;
+    three.freed_by = frees;
+    three.objects[{0x1001, 0}].value = 0x11;
+    three.objects[{0x1003, 1}].value = 0x8130;
+    std::vector<std::string> told;
+    (void)bring_up({}, [&told](const std::string& line) { told.push_back(line); });
+    for (const DriveSlot& slot : slots) EXPECT_EQ(slot.drive->nmt_state(), NmtState::operational);
+    return told;
   }
   // The message of a failed bring-up; no drive may have been started.
   std::string refusal() {
@@ -259,6 +270,52 @@ TEST_F(Cia402BringUpTest, AbortsOfOptionalObjectsThatExistAreRefusalsToo) {
   has(refusal(), "SDO abort 06090030: invalid value for parameter");
 }
 
+// Drives have fewer option codes and narrower ranges than the profile: it is theirs then, and what is lost is said.
+TEST_F(Cia402BringUpTest, AnOptionalObjectThatRefusesTheValueIsTakenAsItIsAndTold) {
+  const TableNode::Key keys[] = {{0x605A, 0}, {0x605B, 0}, {0x605E, 0}, {0x6065, 0},
+                                 {0x6085, 0}, {0x1006, 0}, {0x1029, 1}, {0x1400, 5}};
+  for (const std::uint32_t code : {0x06090030U, 0x06090031U, 0x06090032U}) {
+    for (const TableNode::Key& key : keys) {
+      three.write_aborts = {{key, code}};
+      three.objects = TableNode::servo_drive();
+      EXPECT_NO_THROW(bring_up()) << std::hex << key.first;
+      char name[16];
+      std::snprintf(name, sizeof name, "%04Xh:%02X is 0x", key.first, key.second);
+      ASSERT_EQ(drives[2].losses().size(), 2U) << name;
+      has(drives[2].losses().front(), name);
+      has(drives[2].losses().front(), " and can't be set to ");
+    }
+  }
+}
+
+TEST_F(Cia402BringUpTest, A6007hThatRefusesTheValueIsTakenUnlessItDoesNothing) {
+  three.write_aborts = {{{0x6007, 0}, 0x06090030}};
+  EXPECT_NO_THROW(bring_up());
+  has(drives[2].losses().front(), "how it stops without the controller is its own affair");
+  network.bus(0).sent.clear();
+  network.bus(1).sent.clear();
+  three.objects[{0x6007, 0}].value = 0;
+  has(refusal(),
+      "object 6007h:00 abort connection option code (quick stop): drive of axis_3: found 0x0000 (0), which "
+      "can't be written");
+}
+
+TEST_F(Cia402BringUpTest, AnObjectThatIsNeededMustTakeItsValue) {
+  for (const TableNode::Key& key : {TableNode::Key{0x1016, 1}, {0x6060, 0}, {0x60C2, 1}}) {
+    three.write_aborts = {{key, 0x06090030}};
+    has(refusal(), "SDO abort 06090030: invalid value for parameter");
+  }
+}
+
+TEST_F(Cia402BringUpTest, A60C2hThatCantBeWrittenIsTakenWhereItFits) {
+  three.write_aborts = {{{0x60C2, 2}, 0x06010002}};
+  EXPECT_NO_THROW(bring_up());
+  network.bus(0).sent.clear();
+  network.bus(1).sent.clear();
+  three.objects[{0x60C2, 2}].value = 0xFC;
+  has(refusal(), "object 60C2h:02 interpolation time index: drive of axis_3: found 0xFC (252), which can't be written");
+}
+
 TEST_F(Cia402BringUpTest, WaitsAWhileForTheModeToChangeThenSaysSo) {
   three.mode_follows = false;
   const std::int64_t begin_ns = network.time_ns;
@@ -297,6 +354,58 @@ TEST_F(Cia402BringUpTest, SaysWhenADriveDoesNotStart) {
     has(error.what(),
         "bus axes_3, node 3: drive of axis_3, NMT state in its heartbeat: found pre-operational, expected "
         "operational");
+  }
+}
+
+// The words of one that is held back: what it holds, and each means that was tried.
+const std::string of_three = "drive of axis_3 (bus axes_3, node 3)";
+const std::string holds = of_three +
+                          " holds EMCY 8130: life guard error or heartbeat error (error register 11: generic, "
+                          "communication) from before this session, and refuses NMT start";
+
+TEST_F(Cia402BringUpTest, ADriveThatHoldsAnErrorIsHelpedByAFaultResetFirst) {
+  const auto told = told_of_a_held_drive([](const CanFrame& f) {
+    return f.id == 0x603 && f.data[0] == 0x2B && f.data[1] == 0x40 && f.data[2] == 0x60 && f.data[4] == 0x80;
+  });
+  EXPECT_EQ(told, (std::vector<std::string>{holds, of_three + ": started after a fault reset"}));
+  EXPECT_EQ(three.objects.at({0x6040, 0}).value, 0U);
+  EXPECT_EQ(three.objects.at({0x1006, 0}).value, 1000U);
+  for (const std::string& frame : network.bus(1).sent) EXPECT_NE(frame, "080#");
+}
+
+TEST_F(Cia402BringUpTest, ThenBySyncAndHeartbeatBeforeNmtStart) {
+  int syncs = 0, beats = 0;
+  const auto told = told_of_a_held_drive([&](const CanFrame& f) {
+    syncs += f.id == 0x080 ? 1 : 0;
+    beats += f.id == 0x77F && f.data[0] == 0x05 ? 1 : 0;
+    return syncs >= 50 && beats >= 3;
+  });
+  EXPECT_EQ(told, (std::vector<std::string>{holds, of_three + ": not started after a fault reset",
+                                            of_three + ": started after SYNC and heartbeat before NMT start"}));
+  EXPECT_EQ(three.resets, 0);
+  EXPECT_EQ(three.objects.at({0x1006, 0}).value, 0U) << "no SYNC comes until the first cycle";
+  EXPECT_EQ(three.objects.at({0x1016, 1}).value, 0x007F003CU);
+  has(drives[2].losses().front(), "1006h:00 stays 0");
+}
+
+TEST_F(Cia402BringUpTest, AndByAResetOfItsOwnCommunicationLast) {
+  const auto told = told_of_a_held_drive([](const CanFrame& f) { return f.id == 0 && f.data[0] == 0x82; });
+  ASSERT_EQ(told.size(), 4U);
+  EXPECT_EQ(told.back(), of_three + ": started after NMT reset communication (82h)");
+  EXPECT_EQ(three.resets, 1);
+  EXPECT_EQ(three.objects.at({0x1006, 0}).value, 1000U) << "configured anew";
+  EXPECT_EQ(three.objects.at({0x1400, 1}).value, 0x203U);
+  EXPECT_EQ(one.resets + two.resets, 0) << "for that node alone";
+  for (const std::string& frame : network.bus(0).sent) EXPECT_NE(frame.substr(0, 6), "000#82");
+}
+
+TEST_F(Cia402BringUpTest, ADriveThatNothingHelpsIsNamedWithWhatItHoldsAndWhatWasTried) {
+  try {
+    (void)told_of_a_held_drive([](const CanFrame&) { return false; });
+    FAIL() << "brought up";
+  } catch (const SetupError& error) {
+    has(error.what(), "found pre-operational, holding EMCY 8130");
+    has(error.what(), "after a fault reset, SYNC and heartbeat before NMT start, NMT reset communication (82h)");
   }
 }
 

@@ -158,6 +158,79 @@ TEST_F(Cia402DriveTest, ResetsTheFaultThatItIsFoundIn) {
   EXPECT_EQ(drive.fault(), DriveFault::state_fault);
 }
 
+// Code, error register; which stop the arm.
+TEST_F(Cia402DriveTest, AnEmergencyIsAFaultUnlessTheDriveSaysThatItGoesOn) {
+  const std::pair<const char*, DriveFault> rows[] = {
+      {"083#1042080000000000", DriveFault::emergency},  // temperature
+      {"083#1042000000000000", DriveFault::emergency},  // the same with no bit in the register
+      {"083#1042", DriveFault::emergency},              // and with no register
+      {"083#3081110000000000", DriveFault::emergency},  // heartbeat
+      {"083#0081", DriveFault::emergency},              // communication, with no register
+      {"083#0081000000000000", DriveFault::none},       // and with a register that says: none
+      {"083#2081110000000000", DriveFault::none},       // error passive
+      {"083#2082110000000000", DriveFault::none},       // PDO too long
+      {"083#01FF000000000000", DriveFault::none},       // the maker's, no error
+      {"083#01FF800000000000", DriveFault::emergency},
+      {"083#0000000000000000", DriveFault::none}};
+  for (const auto& [frame, fault] : rows) {
+    drive = ServoDrive(thousand_counts_per_rad(), DriveSettings{});
+    enable();
+    (void)drive.on_frame(frame_of(frame), now_ns);
+    EXPECT_EQ(drive.fault(), fault) << frame;
+  }
+}
+
+TEST_F(Cia402DriveTest, TwoTpdosAtEachSyncAreTwoDrivesWithOneNode) {
+  enable();
+  const auto doubled = [this] {
+    cycle("183#371200000000");
+    (void)drive.on_frame(frame_of("183#371240000000"), now_ns + 200'000);
+  };
+  for (int i = 0; i < 9; ++i) doubled();
+  cycle("183#371200000000");  // a line that doubles frames now and then begins anew
+  for (int i = 0; i < 10; ++i) doubled();
+  EXPECT_EQ(drive.fault(), DriveFault::none);
+  cycle("183#371200000000");
+  EXPECT_EQ(drive.fault(), DriveFault::two_nodes);
+}
+
+TEST_F(Cia402DriveTest, WatchesItsModeWhereItIsMapped) {
+  DriveDescription description = thousand_counts_per_rad();
+  description.feedback = {{0x606100, 8}};
+  drive = ServoDrive(description, DriveSettings{});
+  drive.start_cycle(now_ns);
+  drive.request(DriveGoal::operation_enabled);
+  cycle("183#50020000000000");
+  cycle("183#31020000000000");
+  for (int i = 0; i < 4; ++i) cycle("183#33020000000000");
+  cycle("183#37120000000000");
+  EXPECT_FALSE(drive.following()) << "it is enabled, and shows no mode yet";
+  cycle("183#37120000000008");
+  EXPECT_TRUE(drive.following());
+  EXPECT_EQ(drive.fault(), DriveFault::none);
+  cycle("183#37120000000001");
+  EXPECT_EQ(drive.fault(), DriveFault::mode_changed);
+}
+
+TEST_F(Cia402DriveTest, SaysWhereItStoodWhenItWasGivenUp) {
+  const std::pair<const char*, const char*> rows[] = {
+      {"183#400200000000",
+       "it stayed in switch on disabled (statusword 0x0240): its power stage is kept off; is STO "
+       "closed (E-stop released, safety relay on), is the power supply on (bit 4 says: no voltage)"},
+      {"183#310200000000", "it stayed in ready to switch on (statusword 0x0231)"},
+      {"183#330200000000", "it stayed in switched on (statusword 0x0233)"},
+      {"183#370200000000", "it is enabled, but never says that it follows its targets (bit 12 of the statusword)"}};
+  for (const auto& [tpdo, words] : rows) {
+    drive = ServoDrive(thousand_counts_per_rad(), DriveSettings{});
+    drive.start_cycle(now_ns);
+    drive.request(DriveGoal::operation_enabled);
+    cycle(tpdo);
+    drive.request(DriveGoal::switched_off);
+    cycle("183#500200000000");
+    EXPECT_NE(drive.describe().find(words), std::string::npos) << drive.describe();
+  }
+}
+
 TEST_F(Cia402DriveTest, KeepsTheFirstFaultAndTheLastEmergencyInWords) {
   enable();
   EXPECT_TRUE(drive.on_frame(frame_of("083#1186210000000000"), now_ns));

@@ -233,6 +233,65 @@ TEST(GenericDriveOnALine, NamesFaultsOfTheWire) {
   EXPECT_EQ(fault_after(ModbusResult::ok, {1, 23, 6, 0, 3}).first, DriveFault::none);
 }
 
+// A gateway's "server device busy" asks to be asked again: one is noise on the line, as a late answer is.
+TEST_F(GenericDrive, ABusyGatewayIsAskedAgainUntilTheDriveIsLost) {
+  enable();
+  drive.set_target_rad(0.5);
+  line.answers.push_back({ModbusResult::ok, {1, 23 | 0x80, 6}});
+  EXPECT_TRUE(drive.exchange(line, 5 * ms, 5 * ms));
+  drive.on_sync(6 * ms);
+  EXPECT_EQ(drive.fault(), DriveFault::none);
+  drive.set_target_rad(0.5);
+  answer(3, 500);
+  EXPECT_TRUE(drive.exchange(line, 10 * ms, 5 * ms));
+  for (std::int64_t t_ms = 15; t_ms <= 75; t_ms += 5) {
+    drive.on_sync(t_ms * ms);
+    drive.set_target_rad(0.5);
+    line.answers.push_back({ModbusResult::ok, {1, 23 | 0x80, 6}});
+    EXPECT_TRUE(drive.exchange(line, t_ms * ms, 5 * ms));
+  }
+  drive.on_sync(76 * ms);
+  EXPECT_EQ(drive.fault(), DriveFault::modbus_timeout) << "60 ms without an answer";
+}
+
+TEST_F(GenericDrive, ABusyGatewayIsAskedAgainAtTheStart) {
+  line.answers.push_back({ModbusResult::ok, {1, 16 | 0x80, 6}});
+  line.answers.push_back({ModbusResult::ok, {1, 16, 0, 32, 0, 1}});
+  line.answers.push_back({ModbusResult::ok, {1, 3, 2, 0, 60}});
+  line.answers.push_back({ModbusResult::ok, {1, 3 | 0x80, 6}});
+  line.answers.push_back({ModbusResult::ok, {1, 3, 6, 0, 1, 0, 0, 0x01, 0xF4}});
+  EXPECT_NO_THROW(drive.start_up(line, 0));
+  EXPECT_EQ(line.requests.size(), 5u);
+}
+
+// Range: 10 m to both sides, 10,000 counts. The words of a position, high word first by the file.
+TEST(GenericDriveOnALine, JudgesTheOrderOfWordsByItsFirstPosition) {
+  const auto started = [](const Bytes& position) {
+    TypedLine line;
+    ModbusDrive drive(linear_axis(), shipped("generic_absolute.yaml"), 1 * ms);
+    line.answers.push_back({ModbusResult::ok, {1, 16, 0, 32, 0, 1}});
+    line.answers.push_back({ModbusResult::ok, {1, 3, 2, 0, 60}});
+    Bytes answer{1, 3, 6, 0, 1};
+    answer.insert(answer.end(), position.begin(), position.end());
+    line.answers.push_back({ModbusResult::ok, answer});
+    drive.start_up(line, 0);
+    return drive.word_order_shown();
+  };
+  EXPECT_TRUE(started({0x00, 0x00, 0x01, 0xF4})) << "500; the other way round 32,768,000";
+  EXPECT_TRUE(started({0xFF, 0xFF, 0xFE, 0x0C})) << "-500";
+  EXPECT_FALSE(started({0, 0, 0, 0})) << "0 either way";
+  EXPECT_FALSE(started({0xFF, 0xFF, 0xFF, 0xFF})) << "-1 either way";
+  EXPECT_FALSE(started({0x12, 0x34, 0x56, 0x78})) << "out of range either way: the cycle refuses it";
+  try {
+    (void)started({0x01, 0xF4, 0x00, 0x00});
+    FAIL() << "started";
+  } catch (const description::SetupError& error) {
+    EXPECT_THAT(error.what(),
+                HasSubstr("found 32768000 counts, out of range_rad; with the words in the other order 500"));
+    EXPECT_THAT(error.what(), HasSubstr("is word_order in "));
+  }
+}
+
 TEST_F(GenericDrive, IsLostAfterItsTime) {
   enable();
   drive.on_sync(62 * ms);

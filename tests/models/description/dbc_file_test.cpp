@@ -54,6 +54,20 @@ std::string told(const std::string& text) {
   return "read";
 }
 
+TEST(DbcFile, ReadsOverCommentsAndNodesOnLinesOfTheirOwn) {
+  const DbcFile dbc = parse_dbc(
+      "// exported by a script: BO_ 1 NONE: 8 X\nVERSION \"\"\n\nBU_:\n  HOST // the controller\n  SENSOR\n\n"
+      "BO_ 256 FORCE: 8 SENSOR // the wrench\n"
+      " SG_ Fx : 7|16@0- (0.1,0) [0|0] \"N//m\" HOST\n//",
+      "own.dbc");
+  EXPECT_TRUE(dbc.remarks.empty()) << dbc.remarks.front();
+  ASSERT_EQ(dbc.messages.size(), 1U);
+  EXPECT_EQ(dbc.messages[0].id, 256U);
+  EXPECT_EQ(dbc.messages[0].line, 8);
+  ASSERT_EQ(dbc.messages[0].signals.size(), 1U);
+  EXPECT_EQ(dbc.messages[0].signals[0].unit, "N//m") << "a string is no comment";
+}
+
 TEST(DbcFile, ReadsMessagesAndPlaces) {
   const DbcFile dbc = parse_dbc(usual, "own.dbc");
   ASSERT_EQ(dbc.messages.size(), 2U);

@@ -83,7 +83,7 @@ TEST_F(BusScan, RefusesABusThatSomebodyRuns) {
     (void)fieldbus::scan_bus(*network, 0);
     FAIL() << "scanned";
   } catch (const description::SetupError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("found a SYNC (0x080)"));
+    EXPECT_THAT(error.what(), HasSubstr("found SYNC (0x080), 1 time"));
   }
   EXPECT_EQ(network->bus(0).status().frames_sent, 0U);
 }

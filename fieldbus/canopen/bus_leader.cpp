@@ -1,0 +1,78 @@
+#include "fieldbus/canopen/bus_leader.hpp"
+
+#include <algorithm>
+
+#include "fieldbus/canopen/canopen_heartbeat.hpp"
+#include "fieldbus/canopen/canopen_object.hpp"
+#include "fieldbus/canopen/canopen_pdo.hpp"
+#include "fieldbus/canopen/canopen_sync.hpp"
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+constexpr std::uint32_t nmt_id = 0x000, sdo_request_base = 0x600;
+constexpr std::uint8_t receive_pdos = 4;
+
+const char* name_of(std::uint32_t id) noexcept {
+  if (id == nmt_id) return "NMT commands";
+  if (id == sync_id) return "SYNC";
+  if (id > heartbeat_id(0)) return "a controller's heartbeat";
+  return id > sdo_request_base ? "SDO requests" : "setpoints";
+}
+
+}  // namespace
+
+LeaderWatch::LeaderWatch(BusToLead bus) : bus_(std::move(bus)) {}
+
+std::vector<std::uint32_t> LeaderWatch::wanted_ids() const {
+  std::vector<std::uint32_t> ids{nmt_id, sync_id};
+  if (bus_.master_node != 0) ids.push_back(heartbeat_id(bus_.master_node));
+  for (const std::uint8_t node : bus_.nodes) {
+    for (std::uint8_t number = 1; number <= receive_pdos; ++number) {
+      ids.push_back(pdo_id(PdoDirection::receive, number, node));
+    }
+    ids.push_back(sdo_request_base + node);
+  }
+  return ids;
+}
+
+void LeaderWatch::on_frame(const CanFrame& frame) {
+  if (frame.extended || frame.remote || frame.error) return;
+  const std::vector<std::uint32_t> ids = wanted_ids();
+  if (std::find(ids.begin(), ids.end(), frame.id) != ids.end()) ++counts_[frame.id];
+}
+
+std::string LeaderWatch::signs() const {
+  std::string text;
+  for (const auto& [id, count] : counts_) {
+    text += (text.empty() ? "" : "; ") + std::string(name_of(id)) + " (" + hex_text(id, 3) + ")";
+    text += ", " + std::to_string(count) + (count == 1 ? " time" : " times");
+  }
+  return text;
+}
+
+void require_nobody_leads(CanNetwork& network, std::span<const BusToLead> buses, std::int64_t time_ns,
+                          const FrameHandler& other) {
+  std::vector<LeaderWatch> watches;
+  for (const BusToLead& bus : buses) watches.emplace_back(bus);
+  const FrameHandler on_frame = [&](std::size_t from, const TimedFrame& received) {
+    for (std::size_t i = 0; i < buses.size(); ++i) {
+      if (buses[i].bus == from) watches[i].on_frame(received.frame);
+    }
+    if (other) other(from, received);
+  };
+  const std::int64_t until_ns = network.now_ns() + time_ns;
+  pump_frames(network, until_ns, on_frame, [until_ns](std::int64_t) { return until_ns; });
+  for (std::size_t i = 0; i < buses.size(); ++i) {
+    if (!watches[i].seen()) continue;
+    throw description::SetupError(
+        {.bus = network.bus(buses[i].bus).name(),
+         .message = "somebody leads this bus, and nothing was sent",
+         .found = watches[i].signs(),
+         .expected = "a bus that nobody leads",
+         .advice = "end the other session or master first: two would disturb each other's drives"});
+  }
+}
+
+}  // namespace proxarm::fieldbus

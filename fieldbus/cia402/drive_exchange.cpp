@@ -1,0 +1,81 @@
+#include "fieldbus/cia402/drive_exchange.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+using Slots = std::span<const DriveSlot>;
+
+}  // namespace
+
+std::vector<SdoSequence> exchange(CanNetwork& network, Slots drives, const FrameHandler& handler,
+                                  const StepsOf& steps_of, std::vector<std::uint64_t>* boot_ups) {
+  std::vector<SdoSequence> sequences;
+  sequences.reserve(drives.size());
+  for (const DriveSlot& slot : drives) {
+    const ServoDrive& drive = *slot.drive;
+    sequences.emplace_back(network.bus(slot.bus), drive.node(), drive.description().bus,
+                           "drive of " + drive.description().joint, steps_of(drive), drive.settings().sdo);
+  }
+  for (SdoSequence& sequence : sequences) sequence.start(network.now_ns());
+  std::vector<std::uint64_t> at_first_answer;
+  for (const DriveSlot& slot : drives) at_first_answer.push_back(slot.drive->boot_ups());
+  const FrameHandler on_frame = [&](std::size_t bus, const TimedFrame& received) {
+    bool taken = false;
+    for (std::size_t i = 0; i < sequences.size() && !taken; ++i) {
+      if (drives[i].bus != bus) continue;
+      const bool answered = sequences[i].answered();
+      taken = sequences[i].on_frame(received.frame, received.time_ns);
+      if (!answered && sequences[i].answered()) at_first_answer[i] = drives[i].drive->boot_ups();
+    }
+    if (!taken) handler(bus, received);
+  };
+  // Each exchange has its own deadline, so the whole ends by itself.
+  constexpr std::int64_t forever = std::numeric_limits<std::int64_t>::max();
+  pump_frames(network, forever, on_frame, [&](std::int64_t now_ns) {
+    std::int64_t wake_ns = forever;
+    bool done = true;
+    for (SdoSequence& sequence : sequences) {
+      sequence.poll(now_ns);
+      if (sequence.finished()) continue;
+      done = false;
+      wake_ns = std::min(wake_ns, sequence.wake_ns(now_ns));
+    }
+    return done ? pump_done : wake_ns;
+  });
+  if (boot_ups != nullptr) *boot_ups = at_first_answer;
+  return sequences;
+}
+
+void send_nmt(CanNetwork& network, Slots drives, NmtCommand command, const char* name) {
+  for (const DriveSlot& slot : drives) {
+    const SendResult result = network.bus(slot.bus).send(nmt_frame(command, slot.drive->node()));
+    if (result == SendResult::sent) continue;
+    const char* found = result == SendResult::queue_full ? "a full queue"
+                        : result == SendResult::bus_off  ? "bus-off"
+                        : result == SendResult::refused  ? "a frame that the interface can't carry"
+                                                         : "an interface that is down";
+    throw description::SetupError(
+        {.bus = slot.drive->description().bus,
+         .node = slot.drive->node(),
+         .message = std::string("the NMT command ") + name + " could not be sent",
+         .found = found,
+         .advice = "is the interface up, and is another node on the bus to acknowledge frames?"});
+  }
+}
+
+bool wait_for_state(CanNetwork& network, Slots drives, const FrameHandler& handler, NmtState state,
+                    std::int64_t timeout_ns) {
+  const std::int64_t deadline_ns = network.now_ns() + timeout_ns;
+  return pump_frames(network, deadline_ns, handler, [&](std::int64_t) {
+    const bool all = std::all_of(drives.begin(), drives.end(),
+                                 [state](const DriveSlot& slot) { return slot.drive->nmt_state() == state; });
+    return all ? pump_done : deadline_ns;
+  });
+}
+
+}  // namespace proxarm::fieldbus
