@@ -43,14 +43,11 @@ void SentPoint::start(const Vec3& q_W) noexcept {
   start_filter(q_W, Vec3::Zero());
 }
 
-Vec3 SentPoint::resume(const Vec3& c_W, const Vec3& velocity_W, double ahead_s) noexcept {
+void SentPoint::resume(const Vec3& c_W, const Vec3& q_W, const Vec3& velocity_W) noexcept {
   state_.c_k1_W = c_W;
   state_.c_k2_W = c_W - period_s_ * velocity_W;
-  state_.beside_W.setZero();
-  state_.changes = false;
-  const Vec3 q_W = c_W - ahead_s * velocity_W;
+  take_up_change();
   start_filter(q_W, velocity_W);
-  return q_W;
 }
 
 void SentPoint::advance_horizon() noexcept {

@@ -45,9 +45,8 @@ class SentPoint {
 
   // Starts at rest at q_W; the horizon stays.
   void start(const models::Vec3& q_W) noexcept;
-  // The arm couldn't follow: c goes on from c_W with this velocity. Returns the proxy's position then, which is
-  // `ahead_s` behind.
-  [[nodiscard]] models::Vec3 resume(const models::Vec3& c_W, const models::Vec3& velocity_W, double ahead_s) noexcept;
+  // The arm couldn't follow: c goes on from c_W and the proxy from q_W, with this velocity.
+  void resume(const models::Vec3& c_W, const models::Vec3& q_W, const models::Vec3& velocity_W) noexcept;
   // Advances H by one period. Precondition: called before the proxy's step.
   void advance_horizon() noexcept;
   // The proxy has stepped to q_W, and the scene leads it to predicted_W. `limits`: the sets around c(k−1).

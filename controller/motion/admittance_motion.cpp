@@ -524,13 +524,17 @@ void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   const models::ToolKinematics& at = arm_step_.kinematics();
   const Vec3 velocity_W = at.J_W.topRows<3>() * speed;
   const Vec3 omega_W = no_faster(at.J_W.bottomRows<3>() * speed, most_turning_rad_per_s());
-  const Vec3& c_W = at.X_WT.translation();
-  const Vec3 q_W = ahead_ ? ahead_->point.resume(c_W, velocity_W, ahead_s()) : c_W;
+  Vec3 q_W = at.X_WT.translation();
+  if (ahead_) {
+    ahead_->proxy_step.resume(arm_step_.link_rad() - ahead_s() * speed, period_s_ * speed);
+    ahead_->proxy_filter.resume(filter.rad() - ahead_s() * speed, speed);
+    // Where joints that turn on lead the tool, which isn't straight: a proxy beside its own step would be moved there.
+    const Vec3 c_W = q_W;
+    q_W = ahead_->proxy_step.kinematics().X_WT.translation();
+    ahead_->point.resume(c_W, q_W, velocity_W);
+  }
   state_.q_k1_W = tool().resume(q_W, velocity_W, orientation_of(at.X_WT), omega_W);
   state_.q_k2_W = state_.q_k1_W - period_s_ * velocity_W;
-  if (!ahead_) return;
-  ahead_->proxy_step.resume(arm_step_.link_rad() - ahead_s() * speed, period_s_ * speed);
-  ahead_->proxy_filter.resume(filter.rad() - ahead_s() * speed, speed);
 }
 
 }  // namespace proxarm::controller

@@ -87,12 +87,15 @@ TEST(SentPoint, GoesOnFromWhereTheArmIs) {
   SentPoint sent(cell_limits(), 8e-3, T);
   sent.start(Vec3::Zero());
   const Vec3 c(0.1, 0.2, 0.3), v(0.2, 0.0, -0.1);
-  const Vec3 q = sent.resume(c, v, 8e-3);
-  EXPECT_LT((q - (c - 8e-3 * v)).norm(), 1e-15) << "the proxy is a horizon behind";
+  const Vec3 q = c - 8e-3 * v + Vec3(0.0, 0.0, 1e-4);  // joints that turned on would lead it there
+  sent.resume(c, q, v);
   EXPECT_EQ(sent.c_k1_W(), c);
   EXPECT_LT((sent.c_k1_W() - sent.c_k2_W() - T * v).norm(), 1e-15);
   const double omega = 2.0 * 3.14159265358979 * 25.0;
   EXPECT_LT((sent.filtered_W() + 2.0 / omega * sent.filtered_velocity_W() - q).norm(), 1e-12);
+  // Where the scene leads the proxy is beside c by 0.1 mm: c goes on as it did, and comes there as the offset fades.
+  sent.step(q + T * v, q + T * v + 8e-3 * v, {});
+  EXPECT_LT((sent.c_k1_W() - (c + T * v)).norm(), 1e-12);
 }
 
 // The proxy's own filter: behind it by 2/ω at a constant speed, as the arm's is behind what is commanded.
