@@ -14,9 +14,8 @@ using models::Vec3;
 namespace {
 
 constexpr double least_m_per_rad = 0.05, share_of_start = 0.5;
-// The gradient is computed below this many times the least σ: a tool at 0.5 m/s needs 0.2 s for the way between the
-// two.
-constexpr double near_times = 3.0;
+// The gradient is computed below the least σ and this: a tool at 0.5 m/s needs 0.2 s for the way between the two.
+constexpr double near_m_per_rad = 0.1;
 // Of the finite differences of J_w, which is exact to 1e-16 m: the error is 1e-6 of ∂J_w/∂c by each of the two causes.
 constexpr double nudge_rad = 1e-6;
 // Axes that pass the wrist's origin within this meet there: a URDF's digits of a right angle are off by 1e-9 rad.
@@ -40,7 +39,7 @@ PlaceMargin::PlaceMargin(const models::Arm& arm, const models::ToolSpace& space)
   arm.kinematics(arm.start_rad(), at);
   apart_ = axes >= 6 && !axes_meet(at);
   least_ = std::min(least_m_per_rad, share_of_start * smallest(wrist(at).J_W).value);
-  near_below_ = near_times * least_;
+  near_below_ = least_ + near_m_per_rad;
   from_rad_ = arm.start_rad();
 }
 
