@@ -76,11 +76,14 @@ class OddArms(ProgramTest):
         broken = self.made(text.replace("</robot>", "", 1))
         self.assert_refused(broken, "arm.urdf", "not XML")
 
-    def test_drives_that_are_too_weak_are_told_of(self):
-        # Efforts that bear the light wrist's weight, and no hand. A slower filter isn't stable: that isn't the reason.
+    def test_efforts_that_cant_move_the_arm_are_told_of_and_not_taken(self):
+        # They bear the light wrist's weight, and no hand.
         made = self.made(arm(SIX).replace('effort="0"', 'effort="1"'))
-        self.assert_refused(made, "arm.urdf: default_mass_kg", "is stopped by", "effort",
-                            "the cell that was tried is " + str(self.folder / "out/unfinished-cell.yaml"))
+        self.assertEqual((made.status, made.err), (0, ""))
+        for joint in range(1, 7):
+            self.assertRegex(made.out, rf"joint joint_{joint}: its effort of 1 Nm can't bear the arm and .*: \d+ is taken")
+        cell = (self.folder / "out/cell.yaml").read_text()
+        self.assertNotIn("max_torque_Nm: 1\n", cell)
 
     def test_what_no_arm_is_is_refused_with_the_reason(self):
         for name, text, *told in (
