@@ -48,8 +48,9 @@ constexpr double first_ease = 1.0, next_ease = 4.0, whole_box = 256.0;
 // The wrist is nearly singular where the sine of the middle one of its angles is less.
 constexpr double near_singular = 0.3;
 constexpr int most_rounds = 8;
-constexpr int bisections = 8;   // of the way from braking to a step: to 0.4 % of it
-constexpr double alike = 1e-3;  // of half-spaces' normals: the sine of the angle between them
+constexpr int bisections = 8;         // of the way from braking to a step: to 0.4 % of it
+constexpr double coming_back = 0.1;  // of what braking is beyond the sets of turning
+constexpr double alike = 1e-3;        // of half-spaces' normals: the sine of the angle between them
 constexpr double rounding_rad = 1e-12;
 constexpr std::size_t first_point = 2;  // the first joint whose place is limited; the two before it hardly move
 
@@ -473,12 +474,12 @@ bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexce
 }
 
 // Half-spaces come near to a curved set in ever smaller steps. What is left is taken back towards braking, which leaves
-// no set that can be kept. One that braking leaves, too, holds a step back only if that leaves it further.
+// no set that can be kept. Where braking leaves that of turning, too, a step that comes back into it is taken: a tool
+// that stood a little beyond its limit would stay there for good.
 JointVector ArmStep::taken_back(const Model& model, const JointVector& u) const noexcept {
-  const double turned = std::max(set_tolerance, turned_beyond(model, brakes_).norm());
-  const bool keeps_points = !points_too_fast(brakes_, nullptr);
+  const double most = std::max(set_tolerance, coming_back * turned_beyond(model, brakes_).norm());
   const auto leaves = [&](const JointVector& tried) {
-    return turned_beyond(model, tried).norm() > turned || (keeps_points && points_too_fast(tried, nullptr));
+    return turned_beyond(model, tried).norm() > most || points_too_fast(tried, nullptr);
   };
   if (!leaves(u)) return u;
   double kept = 0.0, left = 1.0;
