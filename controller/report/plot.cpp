@@ -19,6 +19,10 @@ using models::Vec3;
 constexpr std::size_t most_samples = 4000;
 constexpr double nothing_rad = 1e-6;  // its axis is known to 1e-9
 
+// As the browser's view has them (--shade-stick and --shade-slip of controller/view/page/style.css, on white).
+constexpr const char* stick_ground = "#ddecf5";
+constexpr const char* slip_ground = "#f9e7d9";
+
 // Of the picture, in pixels.
 constexpr double head = 98.0, row_height = 236.0, between_rows = 21.0, foot = 108.0;
 
@@ -250,7 +254,7 @@ std::string PlotBuilder::shade_contacts(std::ostream& gp, double shortest_labell
     if (band.contact == ContactPhase::free) continue;
     const bool slip = band.contact == ContactPhase::slip;
     gp << "set object " << ++object << " rectangle from " << band.from_s << ", graph 0 to " << band.to_s
-       << ", graph 1 fillcolor rgb '" << (slip ? "#c9dff0" : "#e4e4e4") << "' fillstyle solid noborder behind\n";
+       << ", graph 1 fillcolor rgb '" << (slip ? slip_ground : stick_ground) << "' fillstyle solid noborder behind\n";
     if (band.to_s - band.from_s <= shortest_labelled_s) continue;
     labels << "set label " << object << " '" << contact_phase_name(band.contact) << "' at "
            << 0.5 * (band.from_s + band.to_s) << ", graph 1.07 center\n";
