@@ -35,7 +35,7 @@ function parametersOf(stage) {
 }
 
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
-const BEFORE_UNIT = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s+(\S+)$/i;
+const BEFORE_UNIT = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s+([^\d\s.,+-]\S*)$/i;
 
 // A number alone is in the field's unit; with a unit, or anything else, the session judges it as it was typed.
 function valueOf(parameter, typed) {
@@ -138,6 +138,7 @@ export class Control {
     const begin = () => {
       changing = true;
       answer.textContent = '';
+      delete answer.dataset.refused;
       field.removeAttribute('aria-invalid');
     };
     field.addEventListener('input', begin);

@@ -22,13 +22,14 @@ function length(m) {
 
 const newtonMetres = (moment, name) => `${Math.hypot(...vector(moment, name)).toFixed(3)} Nm`;
 const turns = (moment) => moment.inertia_kg_m2 > 0;
+const feelsTorque = (moment, stage) => turns(moment) || stage.tool.parts.length > 0;
 
 // A label, its text, and of some figures whether there is such a thing.
 const SESSION_FIGURES = [
   ['hand’s force', (m) => newtons(m.hand_N)],
-  ['hand’s torque', (m) => newtonMetres(m, 'torque'), turns],
+  ['hand’s torque', (m) => newtonMetres(m, 'torque'), feelsTorque],
   ['force of contact', (m) => (m.contact ? newtons(m.contact_N) : '—')],
-  ['torque of contact', (m) => (m.contact ? newtonMetres(m, 'contact_torque') : '—'), turns],
+  ['torque of contact', (m) => (m.contact ? newtonMetres(m, 'contact_torque') : '—'), feelsTorque],
   ['touches', (m, stage) => (m.contact ? name(stage, m) : 'nothing')],
   ['friction μ', (m) => (m.contact ? m.friction.toFixed(3) : '—')],
   ['proxy to surface', (m) => length(m.proxy_clearance_m)],
@@ -149,7 +150,7 @@ export class Panel {
     this.toldMoment = this.moment;
     this.figures.forEach(([, text, there], i) => {
       const { term, value } = this.cells[i];
-      term.hidden = value.hidden = Boolean(there) && !there(this.moment);
+      term.hidden = value.hidden = Boolean(there) && !there(this.moment, this.stage);
       value.textContent = value.hidden ? '' : text(this.moment, this.stage);
     });
   }
