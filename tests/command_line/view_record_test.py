@@ -2,6 +2,8 @@
 import csv
 import json
 import os
+import re
+import shutil
 import unittest
 
 import view_browser
@@ -98,6 +100,24 @@ class Records(ProgramTest):
         (folder / "signals.csv").write_bytes(b"")
         self.assert_refused(self.call("view", folder), "signals.csv", "empty")
 
+
+
+class Colours(ProgramTest):
+    @unittest.skipUnless(shutil.which("gnuplot"), "no gnuplot")
+    def test_the_plot_of_a_run_has_those_of_the_view(self):
+        """What sticks was blue in the view and grey in the plot, what slips orange in the view and blue in the plot."""
+        self.call("run", "--record", "session", "--duration", "6s")
+        drawn = (self.folder / "session" / "plot.svg").read_text().replace(" ", "")
+        light = (SOURCE / "controller/view/page/style.css").read_text().split(":root[data-theme")[0]
+        for name in ("tool", "proxy", "hand", "shade-stick", "shade-slip"):
+            with self.subTest(name):
+                number = re.search(rf"--{name}: #(\w+);", light)[1]
+                red, green, blue, *opacity = bytes.fromhex(number)
+                share = opacity[0] / 255 if opacity else 1.0
+                on_white = [round(255 + share * (part - 255)) for part in (red, green, blue)]
+                self.assertIn("rgb({},{},{})".format(*on_white), re.findall(r"rgb\([\d,]+\)", drawn))
+        style = dict(re.findall(r"--(\w+): (#\w+);", light))
+        self.assertEqual(style["proxy"], style["stick"], "the contact's line is of what sticks")
 
 
 class Snapshots(ProgramTest):
