@@ -46,6 +46,23 @@ class Records(ProgramTest):
                                           ("friction", "friction_1"), ("tool_clearance_m", "tool_clearance_m")):
                         self.assertAlmostEqual(moment[field], float(rows[index][column]), places=9, msg=field)
 
+    def test_a_record_opens_where_a_contact_lasts(self):
+        """It opened on the first cycle of the first touch: an impact of 136 N for a hand of 0.07 N."""
+        for scene in ("wall", "peg_in_hole", "free"):
+            with self.subTest(scene):
+                folder = self.record("--scene", SOURCE / f"scenes/{scene}.yaml")
+                with open(folder / "signals.csv", newline="") as file:
+                    rows = list(csv.DictReader(file))
+                expected, since = 0, None
+                for i, row in enumerate(rows):
+                    since = None if row["contact"] == "free" else since or float(row["time_s"])
+                    if since and float(row["time_s"]) - since > 0.1 - 1e-6:
+                        expected = i
+                        break
+                self.assertEqual(expected > 100, scene != "free")
+                _, stage = self.opened(folder)
+                self.assertEqual(stage["record"]["open_at"], expected)
+
     def test_each_of_several_contacts_is_told(self):
         """A foam wall and a table at once."""
         folder = self.record("--scene", SOURCE / "scenes/soft_corner.yaml", "--hand", SOURCE / "sim/hands/explore.yaml")
