@@ -326,14 +326,13 @@ class Page(ProgramTest):
 
     def test_a_refusal_stands_beside_its_field(self):
         """It stood at the panel's end, below what is visible of it, and the field had gone back without a word."""
-        scene = SOURCE / "scenes/room.yaml"
-        with view_browser.Browser() as browser, Session(self.folder, "run", "--view-control", "--no-plot", "--scene",
-                                                        scene, "--duration", "60s") as session:
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view-control", "--no-plot", "--duration", "10min") as session:
             self.opened(browser, session)
             browser.until(f"{NOW}.phase === 3", "rendering")
             names = browser.run("return [...document.querySelectorAll('.parameter input[type=text]')].map((f) => f.id.slice(4))")
             self.assertIn("mass", names)
-            self.assertGreater(len(names), 4, "with those of the scene")
+            self.assertGreater(len(names), 4, "with that of the scene")
             for name in names:
                 with self.subTest(name):
                     before = browser.run("return document.getElementById(arguments[0]).value", f"set-{name}")
@@ -365,7 +364,7 @@ class Page(ProgramTest):
     def test_a_unit_may_be_typed(self):
         """"4kg" became "4kgkg"."""
         with view_browser.Browser() as browser, \
-                Session(self.folder, "run", "--view-control", "--no-plot", "--duration", "60s") as session:
+                Session(self.folder, "run", "--view-control", "--no-plot", "--duration", "10min") as session:
             self.opened(browser, session)
             browser.until(f"{NOW}.phase === 3", "rendering")
             for name, typed, shown in (("mass", "5kg", "5"), ("mass", "4500 g", "4.5"), ("mass", "6", "6"),
