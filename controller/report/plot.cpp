@@ -19,6 +19,14 @@ using models::Vec3;
 constexpr std::size_t most_samples = 4000;
 constexpr double nothing_rad = 1e-6;  // its axis is known to 1e-9
 
+// Colours of the browser's view (controller/view/page/style.css): --tool, --proxy, which is the contact's as well, and
+// --hand; --shade-stick and --shade-slip on white.
+constexpr const char* tool_colour = "#b35900";
+constexpr const char* proxy_colour = "#0072b2";
+constexpr const char* hand_colour = "#6b3fa0";
+constexpr const char* stick_ground = "#ddecf5";
+constexpr const char* slip_ground = "#f9e7d9";
+
 // Of the picture, in pixels.
 constexpr double head = 98.0, row_height = 236.0, between_rows = 21.0, foot = 108.0;
 
@@ -225,10 +233,13 @@ std::string PlotBuilder::script(const Axes& axes) const {
   const double from = samples_.front().time_s, to = std::max(samples_.back().time_s, from + 1e-3);
   gp << "set terminal svg size 1200," << height_px() << " font 'sans,21' background 'white' noenhanced\n"
      << "set output 'plot.svg'\nset encoding utf8\n"
-     << "set style line 1 lc rgb '#0072b2' lw 3.2\n"           // tool: solid, wide, blue
-     << "set style line 2 lc rgb '#000000' lw 1.8 dt (8,6)\n"  // proxy: dashed, thin, black
-     << "set style line 3 lc rgb '#d55e00' lw 2.4 dt (10,5)\n"
-     << "set style line 4 lc rgb '#009e73' lw 2.8 dt (2,4)\n"
+     << "set style line 1 lc rgb '" << tool_colour << "' lw 3.2\n"
+     << "set style line 2 lc rgb '" << proxy_colour << "' lw 1.8 dt (8,6)\n"
+     << "set style line 3 lc rgb '" << proxy_colour << "' lw 2.4 dt (10,5)\n"  // contact
+     << "set style line 4 lc rgb '#009e73' lw 2.8 dt (2,4)\n"                  // friction
+     << "set style line 5 lc rgb '" << hand_colour << "' lw 3.2\n"
+     << "set style line 6 lc rgb '" << hand_colour << "' lw 2.4 dt (10,5)\n"  // of a hand alone: y
+     << "set style line 7 lc rgb '" << hand_colour << "' lw 2.8 dt (2,4)\n"   // and z
      << "set xrange [" << from << ":" << to << "]\nset grid lc rgb '#b0b0b0' lw 0.6\n"
      << "set lmargin 11\nset rmargin 3\nset format x ''\n";
   const double top = 1.0 - 23.0 / height_px();
@@ -250,7 +261,7 @@ std::string PlotBuilder::shade_contacts(std::ostream& gp, double shortest_labell
     if (band.contact == ContactPhase::free) continue;
     const bool slip = band.contact == ContactPhase::slip;
     gp << "set object " << ++object << " rectangle from " << band.from_s << ", graph 0 to " << band.to_s
-       << ", graph 1 fillcolor rgb '" << (slip ? "#c9dff0" : "#e4e4e4") << "' fillstyle solid noborder behind\n";
+       << ", graph 1 fillcolor rgb '" << (slip ? slip_ground : stick_ground) << "' fillstyle solid noborder behind\n";
     if (band.to_s - band.from_s <= shortest_labelled_s) continue;
     labels << "set label " << object << " '" << contact_phase_name(band.contact) << "' at "
            << 0.5 * (band.from_s + band.to_s) << ", graph 1.07 center\n";
@@ -294,7 +305,7 @@ void PlotBuilder::draw_turn(std::ostream& gp, const Vec3& axis, const Range& tor
   place(gp, 4);
   gp << "set ylabel 'torque (Nm)' offset 1\nset key inside top right horizontal maxrows 1 samplen 3\n"
      << "set yrange [" << torque_Nm.low << ":" << torque_Nm.high << "]\n"
-     << "plot 'data' using 1:13 with lines ls 1 title 'hand', '' using 1:14 with lines ls 3 title 'contact'\n";
+     << "plot 'data' using 1:13 with lines ls 5 title 'hand', '' using 1:14 with lines ls 3 title 'contact'\n";
 }
 
 void PlotBuilder::draw_forces(std::ostream& gp, bool wall, const Ranges& range) const {
@@ -305,8 +316,9 @@ void PlotBuilder::draw_forces(std::ostream& gp, bool wall, const Ranges& range) 
   gp << "set format x\nset label 1 'time (s)' at graph 0.5, graph -0.27 center\n"
      << "set yrange [" << range.force_N.low << ":" << range.force_N.high << "]\nset ylabel 'force (N)' offset 1\n"
      << "set key at screen 0.97, screen " << 40.0 / height_px() << " horizontal maxrows 1 samplen 3\n"
-     << "plot 'data' using 1:8 with lines ls 1 title '" << names[0] << "', '' using 1:9 with lines ls 3 title '"
-     << names[1] << "', '' using 1:10 with lines ls 4 title '" << names[2] << "'\nunset multiplot\n";
+     << "plot 'data' using 1:8 with lines ls 5 title '" << names[0] << "', '' using 1:9 with lines ls "
+     << (wall ? 3 : 6) << " title '" << names[1] << "', '' using 1:10 with lines ls " << (wall ? 4 : 7) << " title '"
+     << names[2] << "'\nunset multiplot\n";
 }
 
 std::string PlotBuilder::write(const fs::path& svg) const {

@@ -94,7 +94,7 @@ class Page(ProgramTest):
             self.assertLessEqual(ends, width)
         heads = browser.run("return proxarm.plots.plots.map((plot) => plot.head?.map((piece) => piece.text))")
         if any("computing" in (head or [""])[0] for head in heads if head):
-            self.assertRegex(heads[3][-1], r"^(no overrun|\d+ overruns)$")
+            self.assertRegex(heads[3][-1], r"^(no overrun|1 overrun|\d+ overruns|over the period: [\d.]+ ms)$")
         top, bottom, above, below = browser.run("""
             const { world } = proxarm, box = world.canvas.getBoundingClientRect(), point = world.middle.clone();
             let top = Infinity, bottom = -Infinity;
@@ -288,13 +288,13 @@ class Page(ProgramTest):
             browser.run("""const field = document.getElementById('set-mass'), slider = field.parentElement.firstChild;
                            slider.value = 800; slider.dispatchEvent(new Event('input'));
                            slider.dispatchEvent(new Event('change'));""")
-            answer = browser.until("document.getElementById('answer').textContent", "an answer")
+            answer = browser.until("document.getElementById('answer-mass').textContent", "an answer")
             self.assertTrue(answer.startswith("ok: mass="), answer)
             mass = float(browser.run("return document.getElementById('set-mass').value"))
             browser.until(f"Math.abs({NOW}.mass_kg - {mass}) < 1e-6", "the mass that was asked for")
             browser.run("""const field = document.getElementById('set-damping');
                            field.value = '-3'; field.dispatchEvent(new Event('change'));""")
-            browser.until("document.getElementById('answer').dataset.refused === 'true'", "a refusal")
+            browser.until("document.getElementById('answer-damping').dataset.refused === 'true'", "a refusal")
             self.assertEqual(browser.run("return document.getElementById('set-damping').value"), "0")
             browser.run("document.querySelector('[data-line=hold]').click()")
             browser.until(f"{NOW}.phase === 4", "the hold")
@@ -307,6 +307,209 @@ class Page(ProgramTest):
         self.assertIn("holding", {row["phase"] for row in rows})
         masses = [float(row["proxy_mass_kg"]) for row in rows if row["phase"] == "rendering"]
         self.assertAlmostEqual(masses[-1] - masses[0], mass - 4.0, places=9)  # felt: with the handle's, before and after
+
+    def type_into(self, browser, name, text):
+        """As somebody does: by the keyboard, ended by Enter."""
+        browser.run("const field = document.getElementById(arguments[0]); field.focus(); field.select()", f"set-{name}")
+        browser.command("Input.insertText", dict(text=text))
+        browser.press("Enter", text="\r")
+
+    def assert_seen(self, browser, selector, what):
+        """Nothing lies over the middle of this element, and all of it is within its panel and the window."""
+        inside, found = browser.run("""
+            const element = document.querySelector(arguments[0]), box = element.getBoundingClientRect();
+            const panel = document.getElementById('panel').getBoundingClientRect();
+            const top = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);
+            return [box.height > 0 && box.top >= panel.top - 1 && box.bottom <= panel.bottom + 1 && box.bottom <= innerHeight,
+                    element.contains(top)];""", selector)
+        self.assertTrue(inside and found, f"{what} is to be seen")
+
+    def test_a_refusal_stands_beside_its_field(self):
+        """It stood at the panel's end, below what is visible of it, and the field had gone back without a word."""
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view-control", "--no-plot", "--duration", "10min") as session:
+            self.opened(browser, session)
+            browser.until(f"{NOW}.phase === 3", "rendering")
+            names = browser.run("return [...document.querySelectorAll('.parameter input[type=text]')].map((f) => f.id.slice(4))")
+            self.assertIn("mass", names)
+            self.assertGreater(len(names), 4, "with that of the scene")
+            for name in names:
+                with self.subTest(name):
+                    before = browser.run("return document.getElementById(arguments[0]).value", f"set-{name}")
+                    self.type_into(browser, name, "-7")
+                    answer = f"document.getElementById('answer-{name}')"
+                    said = browser.until(f"{answer}.dataset.refused === 'true' && {answer}.textContent", "a refusal")
+                    self.assertTrue(said.startswith("refused: ") and "-7" in said, said)
+                    self.assertEqual(browser.run("return document.getElementById(arguments[0]).value", f"set-{name}"), before)
+                    self.assert_seen(browser, f"[id='answer-{name}']", "the reason")
+                    self.assert_seen(browser, f"[id='set-{name}']", "the field beside it")
+                    gap = browser.run("""const [a, b] = [...arguments].map((id) => document.getElementById(id).getBoundingClientRect());
+                                         return b.top - a.bottom""", f"set-{name}", f"answer-{name}")
+                    self.assertTrue(-1 <= gap <= 8, gap)
+            self.type_into(browser, "mass", "-7")
+            browser.until("document.getElementById('answer-mass').dataset.refused === 'true'", "a refusal")
+            browser.picture("refusal-light")
+            # An order's answer stands below the orders; out of a hold alone there is something to resume.
+            browser.run("document.getElementById('panel').scrollTop = 1e6")
+            browser.run("document.querySelector('[data-line=resume]').click()")
+            browser.until("document.getElementById('answer').dataset.refused === 'true'", "that nothing is held")
+            self.assert_seen(browser, "#answer", "the reason")
+            # What is typed next takes the reason away.
+            self.assertTrue(browser.run("return document.getElementById('answer-mass').textContent"))
+            browser.run("document.getElementById('set-mass').focus()")
+            browser.command("Input.insertText", dict(text="5"))
+            self.assertEqual(browser.run("return document.getElementById('answer-mass').textContent"), "")
+            self.assertEqual(browser.complaints(), [])
+
+    def test_a_unit_may_be_typed(self):
+        """"4kg" became "4kgkg"."""
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view-control", "--no-plot", "--duration", "10min") as session:
+            self.opened(browser, session)
+            browser.until(f"{NOW}.phase === 3", "rendering")
+            for name, typed, shown in (("mass", "5kg", "5"), ("mass", "4500 g", "4.5"), ("mass", "6", "6"),
+                                       ("damping", " 3 Ns/m", "3"), ("damping", "1e0", "1"), ("spring", "5N/m", "5")):
+                with self.subTest(name=name, typed=typed):
+                    self.type_into(browser, name, typed)
+                    answer = f"document.getElementById('answer-{name}')"
+                    browser.until(f"{answer}.dataset.refused === 'false' && {answer}.textContent.startsWith('ok: {name}=')",
+                                  "that it is taken")
+                    browser.until(f"document.getElementById('set-{name}').value === '{shown}'", "the value alone")
+                    browser.until(f"{answer}.textContent === ''", "an answer that is taken away")
+            for name, typed in (("mass", "4N"), ("mass", "4kgkg"), ("mass", "1 2"), ("damping", "3 kg"), ("mass", "")):
+                with self.subTest(name=name, typed=typed):
+                    before = browser.run(f"return document.getElementById('set-{name}').value")
+                    self.type_into(browser, name, typed or " ")
+                    answer = f"document.getElementById('answer-{name}')"
+                    said = browser.until(f"{answer}.textContent", "a refusal")
+                    self.assertTrue(said.startswith("refused: "), said)
+                    self.assertNotIn("kgkgkg", said)
+                    self.assertEqual(browser.run(f"return document.getElementById('set-{name}').value"), before)
+            self.assertEqual(browser.complaints(), [])
+
+    def test_after_the_end_nothing_can_be_changed(self):
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view-control", "--no-plot", "--pace", "virtual", "--duration", "1s") as session:
+            session.until_said("until Ctrl-C")
+            self.opened(browser, session)
+            browser.until("!document.getElementById('ended').hidden", "the end")
+            enabled = browser.run("return [...document.querySelectorAll('#control button, #control input')].filter((i) => !i.disabled).length")
+            self.assertEqual(enabled, 0)
+            self.assertIn("The session is over", browser.run("return document.getElementById('control').innerText"))
+            browser.press("h", text="h")
+            browser.until("document.getElementById('answer').textContent === 'refused: the session is over'", "the key, too")
+            browser.run("document.getElementById('control').scrollIntoView({ block: 'start' })")
+            browser.picture("control-over-light")
+
+    def test_what_a_picture_tells_is_one_number(self):
+        """The panel had 12.4 N and the label in the picture 13.9 N."""
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view", "--no-plot", "--duration", "60s") as session:
+            self.opened(browser, session)
+            self.until_time(browser, 3.8)
+            told = browser.run("""
+                const figure = (name) => [...document.querySelectorAll('#figures dt')].find((t) => t.textContent === name)
+                  .nextSibling.textContent;
+                const pairs = [], until = performance.now() + 10_000;
+                return new Promise((done) => {
+                  const look = () => {
+                    const labels = [...document.querySelectorAll('#labels span')].filter((l) => !l.hidden).map((l) => l.textContent);
+                    if (labels.length === 2) pairs.push([...labels.sort(), '|', ...[figure('force of contact'), figure('hand’s force')].sort()]);
+                    if (pairs.length < 60 && performance.now() < until) requestAnimationFrame(look); else done(pairs);
+                  };
+                  requestAnimationFrame(look);
+                });""")
+            for pair in told:
+                labels, figures = pair[:2], pair[3:]
+                self.assertEqual([text.removesuffix(", arrow cut") for text in labels], figures)
+            self.assertGreater(len({pair[0] for pair in told}), 3, "numbers that change")
+
+    def test_no_overrun_stands_beside_a_cycle_longer_than_its_period(self):
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view", "--no-plot", "--pace", "virtual", "--duration", "1s") as session:
+            session.until_said("until Ctrl-C")
+            self.opened(browser, session)
+
+            def note(compute_us, overruns):
+                browser.run("""proxarm.plots.rows = [[0.1, 20], [0.2, arguments[0]], [0.3, 20]].map(([time_s, us]) => ({
+                                 ...proxarm.panel.moment, time_s, compute_us: 20, compute_peak_us: us, period_s: 1e-3,
+                                 overruns: arguments[1] }));
+                               proxarm.plots.stale = true;""", compute_us, overruns)
+                browser.until("!proxarm.plots.stale", "that it is drawn")
+                return browser.run("return proxarm.plots.plots[3].head[proxarm.plots.plots[3].head.length - 1].text")
+
+            self.assertEqual(note(900, 0), "no overrun")
+            self.assertEqual(note(84123, 0), "over the period: 84.1 ms")
+            self.assertEqual(note(84123, 2), "2 overruns")
+            self.assertEqual(note(84123, 1), "1 overrun")
+            self.assertEqual(browser.complaints(), [])
+
+    def test_an_impact_is_cut_and_told(self):
+        """The arrow of a blow of 136 N left the picture, and so did its peak in the plot, both without their number."""
+        self.call("run", "--no-plot", "--record", "session", "--duration", "5s")
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            forces = [sum(float(row[f"contact_force_W_{axis}_N"]) ** 2 for axis in "xyz") ** 0.5 for row in csv.DictReader(file)]
+        impact = max(range(len(forces)), key=forces.__getitem__)
+        self.assertGreater(forces[impact], 60)
+        for size in ((1280, 720), (390, 844)):
+            with self.subTest(size), view_browser.Browser(*size) as browser, Session(self.folder, "view", "session") as session:
+                self.opened(browser, session)
+                # Opened where the contact lasts, not at the blow.
+                opened = browser.run("return proxarm.stage.record.open_at")
+                self.assertTrue(all(force > 0 for force in forces[opened - 100:opened + 1]))
+                self.assertLess(forces[opened], 20)
+                browser.run(f"proxarm.player.goTo({impact})")
+                browser.until(f"proxarm.player.isShown({impact})", "the blow")
+                label = browser.until("""[...document.querySelectorAll('#labels span')].filter((l) => !l.hidden)
+                                         .map((l) => l.textContent).find((text) => text.includes('cut'))""", "its label")
+                self.assertEqual(label, f"{forces[impact]:.2f} N, arrow cut")
+                ends = browser.run("""
+                    const { stick, slip } = proxarm.world.contacts, arrow = stick.visible ? stick : slip;
+                    const end = arrow.head.getWorldPosition(proxarm.world.middle.clone()).project(proxarm.world.camera);
+                    const box = [...document.querySelectorAll('#labels span')].find((l) => l.textContent.includes('cut'))
+                      .getBoundingClientRect(), picture = proxarm.world.canvas.getBoundingClientRect();
+                    return [end.x, end.y, arrow.second.visible, box.left >= picture.left && box.right <= picture.right];""")
+                self.assertTrue(abs(ends[0]) < 1 and abs(ends[1]) < 1, ends)
+                self.assertEqual(ends[2:], [True, True])
+                peaks = browser.until("proxarm.plots.plots[0].peaks?.length && proxarm.plots.plots[0].peaks.map((p) => p.text)",
+                                      "the peak's number")
+                self.assertIn(f"{forces[impact]:.3g}", " ".join(peaks))
+                browser.picture(f"impact-{size[0]}")
+                # A force that has room has its whole arrow.
+                browser.run(f"proxarm.player.goTo({opened})")
+                browser.until(f"proxarm.player.isShown({opened})", "the opening")
+                self.assertNotIn("cut", browser.run("return document.getElementById('labels').innerText"))
+                self.assertEqual(browser.complaints(), [])
+
+    def test_a_tool_that_turns_has_torques(self):
+        """And a point that is held has none."""
+        self.call("run", "--no-plot", "--record", "session", "--duration", "3s", "--scene", SOURCE / "scenes/peg_in_hole.yaml",
+                  "--inertia", "0.05kgm2")
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        norm = lambda row, name: sum(float(row[f"{name}_W_{axis}_Nm"]) ** 2 for axis in "xyz") ** 0.5
+        index = max(range(len(rows)), key=lambda i: norm(rows[i], "contact_torque"))
+        row = rows[index]
+        self.assertGreater(norm(row, "contact_torque"), 0.001)
+        figures = """return Object.fromEntries([...document.querySelectorAll('#figures dt')].filter((t) => !t.hidden)
+                     .map((t) => [t.textContent, t.nextSibling.textContent]))"""
+        with view_browser.Browser() as browser, Session(self.folder, "view", "session") as session:
+            self.opened(browser, session)
+            browser.run(f"proxarm.player.goTo({index})")
+            browser.until(f"proxarm.player.isShown({index})", "that cycle")
+            told = browser.run(figures)
+            self.assertEqual(told["torque of contact"], f"{norm(row, 'contact_torque'):.3f} Nm")
+            self.assertEqual(told["hand’s torque"], f"{norm(row, 'torque'):.3f} Nm")
+            self.assertAlmostEqual(float(told["inertia felt"].split()[0]), float(row["proxy_inertia_kg_m2"]),
+                                   delta=0.006 * float(row["proxy_inertia_kg_m2"]))
+            browser.picture("torques-light")
+            self.assertEqual(browser.complaints(), [])
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view", "--no-plot", "--pace", "virtual", "--duration", "1s") as session:
+            session.until_said("until Ctrl-C")
+            self.opened(browser, session)
+            browser.until("document.querySelectorAll('#figures dd')[0].textContent", "figures")
+            self.assertFalse([name for name in browser.run(figures) if "torque" in name or "inertia" in name])
 
     def test_fields_follow_whoever_changes_something(self):
         with view_browser.Browser() as browser, \
@@ -325,7 +528,8 @@ class Page(ProgramTest):
             browser.until(f"{NOW}.damping_Ns_per_m >= 4 && {NOW}.damping_Ns_per_m < 8", "what was set meanwhile")
             self.assertEqual(browser.run(f"return {field}.value"), "0")
             browser.run(f"{field}.dispatchEvent(new Event('change'))")
-            browser.until("document.getElementById('answer').textContent === 'ok: damping=0Ns/m'", "back to the first value")
+            browser.until("document.getElementById('answer-damping').textContent === 'ok: damping=0Ns/m'",
+                          "back to the first value")
             browser.until(f"{field}.value === '0' && {NOW}.damping_Ns_per_m < 4", "the damping that was written")
             self.assertEqual(browser.complaints(), [])
 

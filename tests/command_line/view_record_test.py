@@ -2,6 +2,8 @@
 import csv
 import json
 import os
+import re
+import shutil
 import unittest
 
 import view_browser
@@ -43,6 +45,23 @@ class Records(ProgramTest):
                                           ("contact_force_x", "contact_force_W_x_N"), ("time_s", "time_s"),
                                           ("friction", "friction_1"), ("tool_clearance_m", "tool_clearance_m")):
                         self.assertAlmostEqual(moment[field], float(rows[index][column]), places=9, msg=field)
+
+    def test_a_record_opens_where_a_contact_lasts(self):
+        """It opened on the first cycle of the first touch: an impact of 136 N for a hand of 0.07 N."""
+        for scene in ("wall", "peg_in_hole", "free"):
+            with self.subTest(scene):
+                folder = self.record("--scene", SOURCE / f"scenes/{scene}.yaml")
+                with open(folder / "signals.csv", newline="") as file:
+                    rows = list(csv.DictReader(file))
+                expected, since = 0, None
+                for i, row in enumerate(rows):
+                    since = None if row["contact"] == "free" else since or float(row["time_s"])
+                    if since and float(row["time_s"]) - since > 0.1 - 1e-6:
+                        expected = i
+                        break
+                self.assertEqual(expected > 100, scene != "free")
+                _, stage = self.opened(folder)
+                self.assertEqual(stage["record"]["open_at"], expected)
 
     def test_each_of_several_contacts_is_told(self):
         """A foam wall and a table at once."""
@@ -98,6 +117,24 @@ class Records(ProgramTest):
         (folder / "signals.csv").write_bytes(b"")
         self.assert_refused(self.call("view", folder), "signals.csv", "empty")
 
+
+
+class Colours(ProgramTest):
+    @unittest.skipUnless(shutil.which("gnuplot"), "no gnuplot")
+    def test_the_plot_of_a_run_has_those_of_the_view(self):
+        """What sticks was blue in the view and grey in the plot, what slips orange in the view and blue in the plot."""
+        self.call("run", "--record", "session", "--duration", "6s")
+        drawn = (self.folder / "session" / "plot.svg").read_text().replace(" ", "")
+        light = (SOURCE / "controller/view/page/style.css").read_text().split(":root[data-theme")[0]
+        for name in ("tool", "proxy", "hand", "shade-stick", "shade-slip"):
+            with self.subTest(name):
+                number = re.search(rf"--{name}: #(\w+);", light)[1]
+                red, green, blue, *opacity = bytes.fromhex(number)
+                share = opacity[0] / 255 if opacity else 1.0
+                on_white = [round(255 + share * (part - 255)) for part in (red, green, blue)]
+                self.assertIn("rgb({},{},{})".format(*on_white), re.findall(r"rgb\([\d,]+\)", drawn))
+        style = dict(re.findall(r"--(\w+): (#\w+);", light))
+        self.assertEqual(style["proxy"], style["stick"], "the contact's line is of what sticks")
 
 
 class Snapshots(ProgramTest):

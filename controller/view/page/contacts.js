@@ -3,9 +3,12 @@ import * as THREE from './three/build/three.module.js';
 import { UP, Arrow } from './shapes.js';
 import { colour, onTheme } from './theme.js';
 import { PHASE_RENDERING, vector } from './connection.js';
+import { newtons } from './panel.js';
 
 // At a distance of one metre; from further away everything here is drawn larger, so that it keeps its size in the picture.
 const METRES_PER_NEWTON = 0.0075;
+// Longer arrows are cut: in the overview, whose height is 0.69 of its distance, this is 44 % of the height.
+const MOST_N = 40;
 const CONE_HEIGHT = 0.1;
 const TRAIL_POINTS = 360;
 const FREE = 0, STICK = 1, SLIP = 2;
@@ -157,14 +160,12 @@ export class ContactView extends THREE.Group {
       this.trail.push(proxy, moment.contact);
     }
 
-    const scale = METRES_PER_NEWTON * this.size;
-    const force = at(moment, 'contact_force').multiplyScalar(scale);
-    const hand = at(moment, 'force').multiplyScalar(scale);
+    const force = this.arrowOf(moment, 'contact_force'), hand = this.arrowOf(moment, 'force');
     // The hand's arrow ends where it pushes, the world's begins there.
-    this.hand.setTo(proxy.clone().sub(hand), hand);
-    const none = new THREE.Vector3();
-    this.stick.setTo(proxy, moment.contact === STICK ? force : none);
-    this.slip.setTo(proxy, moment.contact === SLIP ? force : none);
+    this.hand.setTo(proxy.clone().sub(hand), hand, moment.hand_N > MOST_N);
+    const none = new THREE.Vector3(), cut = moment.contact_N > MOST_N;
+    this.stick.setTo(proxy, moment.contact === STICK ? force : none, cut);
+    this.slip.setTo(proxy, moment.contact === SLIP ? force : none, cut);
     for (const one of this.cones) this.showCone(one, moment, proxy);
   }
 
@@ -178,16 +179,22 @@ export class ContactView extends THREE.Group {
     return true;
   }
 
-  // What is written beside the arrows.
-  labels(moment) {
-    const proxy = this.proxyOf(moment), out = [], scale = METRES_PER_NEWTON * this.size;
-    if (moment.contact !== FREE) {
-      out.push({ name: 'contact', at: proxy.clone().add(at(moment, 'contact_force').multiplyScalar(scale)),
-                 text: `${moment.contact_N.toFixed(1)} N`, colour: moment.contact === SLIP ? '--slip' : '--stick', beside: [-78, -40] });
+  // A force as metres in the picture, at most MOST_N of it.
+  arrowOf(moment, name) {
+    return at(moment, name).clampLength(0, MOST_N).multiplyScalar(METRES_PER_NEWTON * this.size);
+  }
+
+  // What is written beside the arrows. `told`: the moment that the numbers are of.
+  labels(moment, told) {
+    const proxy = this.proxyOf(moment), out = [];
+    const text = (force_N) => newtons(force_N) + (force_N > MOST_N ? ', arrow cut' : '');
+    if (told.contact !== FREE) {
+      out.push({ name: 'contact', at: proxy.clone().add(this.arrowOf(moment, 'contact_force')), text: text(told.contact_N),
+                 colour: told.contact === SLIP ? '--slip' : '--stick', beside: [-78, -40] });
     }
-    if (moment.hand_N > 0.3) {
-      out.push({ name: 'hand', at: proxy.clone().sub(at(moment, 'force').multiplyScalar(scale)),
-                 text: `${moment.hand_N.toFixed(1)} N`, colour: '--hand', beside: [14, 6] });
+    if (told.hand_N > 0.3) {
+      out.push({ name: 'hand', at: proxy.clone().sub(this.arrowOf(moment, 'force')), text: text(told.hand_N),
+                 colour: '--hand', beside: [14, 6] });
     }
     return out;
   }

@@ -1,5 +1,5 @@
 // Changes to a running session, where it was started with --view-control: lines as `proxarm set` and `proxarm hold` send
-// them, and the session's own answers.
+// them, and the session's own answers, each beside what it answers.
 
 const element = (id) => document.getElementById(id);
 
@@ -34,6 +34,17 @@ function parametersOf(stage) {
   return all;
 }
 
+const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+const BEFORE_UNIT = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s+([^\d\s.,+-]\S*)$/i;
+
+// A number alone is in the field's unit; with a unit, or anything else, the session judges it as it was typed.
+function valueOf(parameter, typed) {
+  if (parameter.vector) return typed.replace(/\s*,\s*/g, ',');
+  return NUMBER.test(typed) ? typed + parameter.unit : typed.replace(BEFORE_UNIT, '$1$2');
+}
+
+const OVER = 'refused: the session is over';
+
 const SETTLED_MS = 3000;  // after a change was taken, until what the session says of itself counts again
 
 const STEPS = 1000;
@@ -48,6 +59,7 @@ function fromSlider(p, at) {
 export class Control {
   constructor(stage, connection) {
     this.connection = connection;
+    this.over = false;
     element('control').hidden = false;
     element('orders').replaceChildren(...ORDERS.map(([label, title, line]) => {
       const button = document.createElement('button');
@@ -68,11 +80,20 @@ export class Control {
     for (const { parameter, show } of this.fields) if (parameter.of(settings) !== parameter.of(before)) show();
   }
 
-  async ask(line) {
-    const answer = await this.connection.ask(line);
+  // After the session nothing can be changed.
+  end() {
+    this.over = true;
+    element('control-over').hidden = false;
+    for (const input of element('control').querySelectorAll('button, input')) input.disabled = true;
+  }
+
+  // `beside`: the output that takes the answer; a refusal is brought into view.
+  async ask(line, beside = element('answer')) {
+    const answer = this.over ? OVER : await this.connection.ask(line);
     const refused = !answer.startsWith('ok: ');
-    element('answer').dataset.refused = String(refused);
-    element('answer').textContent = answer;
+    beside.dataset.refused = String(refused);
+    beside.textContent = answer;
+    if (refused) beside.scrollIntoView({ block: 'nearest' });
     return !refused;
   }
 
@@ -82,8 +103,12 @@ export class Control {
     box.className = 'parameter';
     const label = document.createElement('label'), field = document.createElement('input');
     const slider = parameter.vector ? null : document.createElement('input');
+    const answer = document.createElement('output');
+    answer.className = 'answer';
+    answer.id = `answer-${parameter.name}`;
     field.type = 'text';
     field.id = `set-${parameter.name}`;
+    field.setAttribute('aria-describedby', answer.id);
     field.inputMode = 'decimal';
     label.htmlFor = field.id;
     label.textContent = parameter.label;
@@ -98,13 +123,25 @@ export class Control {
     };
     const send = async () => {
       sending = true;
-      const wanted = field.value.trim();
-      const taken = await this.ask(`${parameter.name}=${wanted}${parameter.vector ? '' : parameter.unit}`);
+      const taken = await this.ask(`${parameter.name}=${valueOf(parameter, field.value.trim())}`, answer);
       changing = sending = false;
-      // What is taken holds from one of the next cycles on; what is refused goes back to what is.
-      if (taken) setTimeout(show, SETTLED_MS); else show();
+      field.setAttribute('aria-invalid', String(!taken));
+      // What is taken holds from one of the next cycles on. What is refused goes back to what is, and the reason, which
+      // names what was wanted, stays until the next change.
+      const told = answer.textContent;
+      if (!taken) return show();
+      setTimeout(() => {
+        if (answer.textContent === told) answer.textContent = '';
+        show();
+      }, SETTLED_MS);
     };
-    field.addEventListener('input', () => { changing = true; });
+    const begin = () => {
+      changing = true;
+      answer.textContent = '';
+      delete answer.dataset.refused;
+      field.removeAttribute('aria-invalid');
+    };
+    field.addEventListener('input', begin);
     field.addEventListener('change', send);
     const leave = () => {
       if (sending) return;
@@ -117,14 +154,14 @@ export class Control {
       Object.assign(slider, { type: 'range', min: '0', max: String(STEPS) });
       slider.setAttribute('aria-label', parameter.label);
       slider.addEventListener('input', () => {
-        changing = true;
+        begin();
         field.value = String(fromSlider(parameter, Number(slider.value)));
       });
       slider.addEventListener('change', send);
       row.append(slider);
     }
     row.append(field);
-    box.append(label, row);
+    box.append(label, row, answer);
     show();
     return { parameter, box, show };
   }

@@ -35,7 +35,10 @@ const connection = new Connection({
       player = new Player(stage, connection, plots, keys);
     }
   },
-  status: (status) => panel.status(status),
+  status: (status) => {
+    panel.status(status);
+    if (status.ended) control?.end();
+  },
   settings: (settings) => control?.follow(settings),
   history: (rows) => (player ? player.takeHistory(rows) : rows.forEach((row) => plots.add(row))),
   frames: (frames) => player?.showFrames(frames),
@@ -45,7 +48,10 @@ const connection = new Connection({
     newest = moment;
     if (player) player.show(moment); else plots.add(moment);
   },
-  lost: () => panel.lost(),
+  lost: () => {
+    panel.lost();
+    control?.end();
+  },
 });
 
 // The newest moment is drawn once per frame of the browser, however many have come.
@@ -63,6 +69,7 @@ function frame(now) {
   }
   player?.tick(now);
   panel.tick(now, Boolean(player) && !player.playing);
+  world.tell(panel.told);
   world.draw();
   plots.draw(now);
 }
@@ -95,4 +102,4 @@ keys.add('=', '', () => world.zoom(CLOSER));
 keys.add('-', 'further away', () => world.zoom(1 / CLOSER), '−');
 
 // For tests and for the curious.
-globalThis.proxarm = { world, plots, panel, connection, get stage() { return stage; }, get player() { return player; } };
+globalThis.proxarm = { world, plots, panel, connection, get control() { return control; }, get stage() { return stage; }, get player() { return player; } };

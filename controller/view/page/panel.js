@@ -1,4 +1,5 @@
 // What the session is doing, in words and figures.
+import { vector } from './connection.js';
 
 const MOMENTARY_MS = 700;  // for how long a limit that acted is still told while time runs: shorter can't be read
 const JUMP_S = 0.3;        // between two moments of a record that don't follow each other
@@ -6,6 +7,9 @@ const JUMP_S = 0.3;        // between two moments of a record that don't follow 
 const BETWEEN_FIGURES_MS = 100;
 
 const element = (id) => document.getElementById(id);
+
+// As the panel and the labels in the picture have it.
+export const newtons = (force_N) => `${force_N.toFixed(2)} N`;
 
 function length(m) {
   if (!Number.isFinite(m)) return '—';
@@ -16,23 +20,31 @@ function length(m) {
   return `${(1e6 * m).toFixed(1)} µm`.replace('-', '−');
 }
 
+const newtonMetres = (moment, name) => `${Math.hypot(...vector(moment, name)).toFixed(3)} Nm`;
+const turns = (moment) => moment.inertia_kg_m2 > 0;
+const feelsTorque = (moment, stage) => turns(moment) || stage.tool.parts.length > 0;
+
+// A label, its text, and of some figures whether there is such a thing.
 const SESSION_FIGURES = [
-  ['hand’s force', (m) => `${m.hand_N.toFixed(2)} N`],
-  ['force of contact', (m) => (m.contact ? `${m.contact_N.toFixed(2)} N` : '—')],
+  ['hand’s force', (m) => newtons(m.hand_N)],
+  ['hand’s torque', (m) => newtonMetres(m, 'torque'), feelsTorque],
+  ['force of contact', (m) => (m.contact ? newtons(m.contact_N) : '—')],
+  ['torque of contact', (m) => (m.contact ? newtonMetres(m, 'contact_torque') : '—'), feelsTorque],
   ['touches', (m, stage) => (m.contact ? name(stage, m) : 'nothing')],
   ['friction μ', (m) => (m.contact ? m.friction.toFixed(3) : '—')],
   ['proxy to surface', (m) => length(m.proxy_clearance_m)],
   ['tool to surface', (m) => length(m.tool_clearance_m)],
   ['tool to proxy', (m) => length(Math.hypot(m.tool_x - m.proxy_x, m.tool_y - m.proxy_y, m.tool_z - m.proxy_z))],
   ['mass felt, wanted', (m) => (m.mass_kg > 0 ? `${m.mass_kg.toFixed(2)} kg` : '—')],
+  ['inertia felt', (m) => `${m.inertia_kg_m2.toPrecision(3)} kg m²`, turns],
   ['damping', (m) => `${m.damping_Ns_per_m.toFixed(1)} Ns/m`],
   ['timestep', (m) => `${(1e3 * m.period_s).toFixed(2)} ms`],
 ];
 
 // Of the simulated arm alone.
 const ARM_FIGURES = [
-  ['hand’s force', (m) => `${m.hand_N.toFixed(2)} N`],
-  ['load on the sensor', (m) => `${m.sensor_N.toFixed(2)} N`],
+  ['hand’s force', (m) => newtons(m.hand_N)],
+  ['load on the sensor', (m) => newtons(m.sensor_N)],
   ['tool, x', (m) => `${m.tool_x.toFixed(4)} m`],
   ['tool, y', (m) => `${m.tool_y.toFixed(4)} m`],
   ['tool, z', (m) => `${m.tool_z.toFixed(4)} m`],
@@ -71,7 +83,7 @@ export class Panel {
       const term = document.createElement('dt'), value = document.createElement('dd');
       term.textContent = label;
       element('figures').append(term, value);
-      return value;
+      return { term, value };
     });
     element('scene-name').textContent = stage.scene.name;
     element('cell-name').textContent = `· ${stage.cell}`;
@@ -120,6 +132,11 @@ export class Panel {
     element('clock').textContent = `${moment.time_s.toFixed(2)} s`;
   }
 
+  // The moment that the figures are of.
+  get told() {
+    return this.toldMoment;
+  }
+
   // Once per frame of the browser. `ofRecord`: the moment is one cycle of a record, which is told as it was, however
   // long it is looked at; so is a session's last one.
   tick(now, ofRecord) {
@@ -130,7 +147,12 @@ export class Panel {
     if (!this.newFigures || (!still && now - this.written < BETWEEN_FIGURES_MS)) return;
     this.newFigures = false;
     this.written = now;
-    this.figures.forEach(([, text], i) => { this.cells[i].textContent = text(this.moment, this.stage); });
+    this.toldMoment = this.moment;
+    this.figures.forEach(([, text, there], i) => {
+      const { term, value } = this.cells[i];
+      term.hidden = value.hidden = Boolean(there) && !there(this.moment, this.stage);
+      value.textContent = value.hidden ? '' : text(this.moment, this.stage);
+    });
   }
 
   showFlags(now, still) {

@@ -8,6 +8,7 @@ const MOST_ROWS = 1500;
 const STICK = 1, SLIP = 2;
 const LEFT = 46, RIGHT = 10, TOP = 24, BOTTOM = 20;
 const TEXT_HEIGHT = 11;
+const PEAK_WIDTH = 52, PEAK_SIGN = 5;  // of a peak's number; from its left end to the middle of its sign
 const HEAD_LEFT = 10, HEAD_ROW = 16, SAMPLE = 20;  // of what stands above the lines
 const HEAD_FONT = '600 12px system-ui, "DejaVu Sans", sans-serif', FONT = '11px system-ui, "DejaVu Sans", sans-serif';
 
@@ -21,7 +22,8 @@ const DASH = { solid: [], dashed: [7, 4], dotted: [2, 3] };
 
 const moved = (m, value) => (m.phase >= PHASE_RENDERING ? value : NaN);
 
-// Lines of peaks may leave the plot at its top: a blow of a millisecond would flatten all else.
+// Lines may leave the plot at its top for a moment: a blow of a millisecond would flatten all else. There stands how
+// high they go.
 const SESSION_PLOTS = [
   { title: 'force', unit: 'N', least: 5, zero: true, lines: [
     { name: 'peaks', value: (m) => moved(m, m.contact_peak_N), colour: '--soft', dash: 'dotted', peaks: true },
@@ -37,8 +39,17 @@ const SESSION_PLOTS = [
   { title: 'computing a cycle', unit: 'µs', least: 10, zero: true, lines: [
     { name: 'longest', value: (m) => m.compute_peak_us, colour: '--soft', dash: 'dotted', peaks: true },
     { name: 'last', value: (m) => m.compute_us, colour: '--accent', dash: 'solid' }],
-    live: true, note: (m) => (m.overruns > 0 ? `${m.overruns} overruns` : 'no overrun') },
+    live: true, note: overrunNote },
 ];
+
+// A cycle may be longer than its period without an overrun: in virtual time, which waits for it.
+function overrunNote(rows) {
+  const { overruns } = rows[rows.length - 1];
+  if (overruns > 0) return overruns === 1 ? '1 overrun' : `${overruns} overruns`;
+  const longest = rows.reduce((most, row) => (row.compute_peak_us > most.compute_peak_us ? row : most));
+  if (longest.compute_peak_us <= 1e6 * longest.period_s) return 'no overrun';
+  return `over the period: ${Number((1e-3 * longest.compute_peak_us).toPrecision(3))} ms`;
+}
 
 // Of the simulated arm alone, whose hand and sensor are what they are whatever its drives do.
 const ARM_PLOTS = [
@@ -186,6 +197,7 @@ class Plot {
     c.clip();
     for (const line of this.description.lines) this.line(line, rows, x, y);
     c.restore();
+    this.numberPeaks(rows, high, x);
     if (playhead !== undefined) {
       c.strokeStyle = colour('--ink');
       c.setLineDash([]);
@@ -280,6 +292,37 @@ class Plot {
     c.stroke();
   }
 
+  // Peaks above the plot, the highest of each that would lie over each other.
+  numberPeaks(rows, high, x) {
+    const c = this.context, { lines } = this.description;
+    this.peaks = [];
+    for (const row of rows) {
+      const value = Math.max(...lines.map((line) => this.scaled(line.value(row))).filter(Number.isFinite));
+      const last = this.peaks[this.peaks.length - 1];
+      if (!(value > high) || x(row.time_s) < LEFT) continue;
+      if (last && x(row.time_s) - last.x < PEAK_WIDTH) {
+        if (value > last.value) Object.assign(last, { value, x: x(row.time_s) });
+      } else {
+        this.peaks.push({ value, x: x(row.time_s) });
+      }
+    }
+    c.font = FONT;
+    c.textBaseline = 'top';
+    for (const peak of this.peaks) {
+      const number = String(Number(peak.value.toPrecision(3)));
+      const width = c.measureText(`▲ ${number}`).width, right = peak.x + width > this.width - 2;
+      peak.text = right ? `${number} ▲` : `▲ ${number}`;
+      const left = right ? peak.x - width + PEAK_SIGN : peak.x - PEAK_SIGN;
+      c.fillStyle = colour('--card');
+      c.globalAlpha = 0.8;
+      c.fillRect(left - 1, this.top - 1, width + 2, TEXT_HEIGHT + 2);
+      c.globalAlpha = 1;
+      c.fillStyle = colour('--ink');
+      c.textAlign = 'left';
+      c.fillText(peak.text, left, this.top);
+    }
+  }
+
   // The title, each line's name behind a piece of it, and the note: in as many rows as that takes, which it returns.
   layHead(rows) {
     const c = this.context, { title, unit, lines, note } = this.description;
@@ -297,7 +340,7 @@ class Plot {
     };
     put(`${title}, ${unit}`, HEAD_FONT);
     for (const line of lines) put(line.name, FONT, line);
-    const text = note && rows.length ? note(rows[rows.length - 1]) : '';
+    const text = note && rows.length ? note(rows) : '';
     if (text) put(text, FONT);
     return row + 1;
   }

@@ -69,6 +69,7 @@ export function lineOf(points, material) {
 }
 
 // An arrow with a body, so that it is seen from afar: solid, or of pieces. It points along z and is scaled by setTo().
+// One that is cut has a second head.
 export class Arrow extends THREE.Group {
   constructor(material, { radius = 0.005, pieces = 1 } = {}) {
     super();
@@ -82,24 +83,27 @@ export class Arrow extends THREE.Group {
     this.head = new THREE.Mesh(
       new THREE.ConeBufferGeometry(3.2 * radius, 9 * radius, 18).rotateX(Math.PI / 2), material);
     this.plainHeadLength = this.headLength = 9 * radius;
-    this.add(this.shaft, this.head);
+    this.second = this.head.clone();
+    this.add(this.shaft, this.head, this.second);
     this.visible = false;
   }
 
   setThickness(factor) {
     this.headLength = this.plainHeadLength * factor;
     this.shaft.scale.x = this.shaft.scale.y = factor;
-    this.head.scale.setScalar(factor);
+    for (const head of [this.head, this.second]) head.scale.setScalar(factor);
   }
 
-  // From a point, along a vector in metres; hidden where that is next to nothing.
-  setTo(from, along) {
+  // From a point, along a vector in metres; hidden where that is next to nothing. `cut`: it should be longer.
+  setTo(from, along, cut = false) {
     const length = along.length();
+    this.second.visible = cut;
     this.visible = length > 1e-3;
     if (!this.visible) return;
     this.position.copy(from);
     this.quaternion.setFromUnitVectors(UP, along.clone().normalize());
     this.shaft.scale.z = Math.max(1e-4, length - this.headLength);
     this.head.position.z = Math.max(this.headLength / 2, length - this.headLength / 2);
+    this.second.position.z = this.head.position.z - 1.4 * this.headLength;
   }
 }

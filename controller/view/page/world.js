@@ -35,6 +35,7 @@ export class World {
     this.canvas = canvas;
     this.labelBox = labels;
     this.labelElements = new Map();
+    this.labelWidths = new Map();
     const software = drawnBySoftware();
     this.renderer = new THREE.WebGLRenderer({ canvas, alpha: true, antialias: !software, powerPreference: 'high-performance' });
     this.software = software;
@@ -159,6 +160,13 @@ export class World {
     this.changed = true;
   }
 
+  // The moment whose numbers the labels have, as the panel's figures do: changes that are faster can't be read.
+  tell(moment) {
+    if (this.told === moment) return;
+    this.told = moment;
+    this.changed = true;
+  }
+
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
     if (!width || !height) return;
@@ -216,7 +224,7 @@ export class World {
   }
 
   placeLabels() {
-    const wanted = this.moment ? this.contacts.labels(this.moment) : [];
+    const wanted = this.moment && this.told ? this.contacts.labels(this.moment, this.told) : [];
     const { width, height } = this;
     const seen = new Set();
     for (const label of wanted) {
@@ -230,9 +238,12 @@ export class World {
         this.labelElements.set(label.name, element);
       }
       element.hidden = false;
-      element.textContent = label.text;
+      if (element.textContent !== label.text) {
+        element.textContent = label.text;
+        this.labelWidths.set(label.name, element.offsetWidth);
+      }
       element.style.color = colour(label.colour);
-      const x = Math.min(width - 70, Math.max(4, (0.5 + p.x / 2) * width + label.beside[0]));
+      const x = Math.min(width - this.labelWidths.get(label.name) - 4, Math.max(4, (0.5 + p.x / 2) * width + label.beside[0]));
       const y = Math.min(height - 26, Math.max(4, (0.5 - p.y / 2) * height + label.beside[1]));
       element.style.transform = `translate(${x}px, ${y}px)`;
     }

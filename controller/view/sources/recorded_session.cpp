@@ -17,6 +17,8 @@ using description::Json;
 
 constexpr std::size_t most_events = 2000;
 constexpr std::int64_t apart_ns = 200'000'000;  // an event that recurs sooner counts as the same
+// A contact that goes on for so long is no bounce, and its force isn't the impact's any more.
+constexpr std::int64_t lasting_ns = 100'000'000;
 
 std::vector<std::string> axis_names(const Stage& stage) {
   std::vector<std::string> names;
@@ -76,7 +78,9 @@ void RecordedSession::read_fault(const std::filesystem::path& folder) {
 void RecordedSession::find_events() {
   const std::uint32_t limits = holding_back();
   CycleRecord last = signals_.row(0);
-  std::int64_t rendered = 0, limited_ns = -apart_ns, touched_ns = -apart_ns;
+  std::int64_t rendered = 0, limited_ns = -apart_ns, touched_ns = -apart_ns, since_ns = 0;
+  std::int64_t longest_ns = -1;
+  std::size_t lasting = 0;  // the first cycle whose contact has lasted, or else the one that comes nearest to that
   const auto add = [&](RecordedEvent::Kind kind, std::size_t at, const CycleRecord& record, std::string text) {
     if (events_.size() < most_events) {
       events_.push_back({kind, at, 1e-9 * static_cast<double>(record.time_ns), std::move(text)});
@@ -92,6 +96,12 @@ void RecordedSession::find_events() {
     if (record.contact != controller::ContactPhase::free) {
       if (record.time_ns - touched_ns >= apart_ns) add(RecordedEvent::Kind::contact, i, record, "touches");
       touched_ns = record.time_ns;
+      if (i == 0 || last.contact == controller::ContactPhase::free) since_ns = record.time_ns;
+      const std::int64_t lasts_ns = std::min(record.time_ns - since_ns, lasting_ns);
+      if (lasts_ns > longest_ns) {
+        longest_ns = lasts_ns;
+        lasting = i;
+      }
     }
     if ((record.flags & limits) != 0) {
       if (record.time_ns - limited_ns >= apart_ns) {
@@ -105,14 +115,7 @@ void RecordedSession::find_events() {
     }
     last = record;
   }
-  const auto first_of = [&](RecordedEvent::Kind kind) {
-    return std::find_if(events_.begin(), events_.end(), [&](const RecordedEvent& e) { return e.kind == kind; });
-  };
-  if (const auto fault = first_of(RecordedEvent::Kind::fault); fault != events_.end()) {
-    opening_ = fault->at;
-  } else if (const auto touch = first_of(RecordedEvent::Kind::contact); touch != events_.end()) {
-    opening_ = touch->at;
-  }
+  opening_ = fault_at_ < size() ? fault_at_ : lasting;
 }
 
 void RecordedSession::index_frames() {

@@ -38,6 +38,7 @@ constexpr std::array fields{
     Field{
         "mass_kg",
         [](const Moment& m) { return m.record.proxy_mass_kg > 0.0 ? m.record.proxy_mass_kg + m.handle_mass_kg : 0.0; }},
+    Field{"inertia_kg_m2", [](const Moment& m) { return m.record.proxy_inertia_kg_m2; }},
     Field{"damping_Ns_per_m", [](const Moment& m) { return m.record.proxy_damping_Ns_per_m; }},
     Field{"energy_hand_J", [](const Moment& m) { return m.record.energies_J.hand; }},
     Field{"energy_proxy_J", [](const Moment& m) { return m.record.energies_J.proxy; }},
@@ -60,6 +61,7 @@ constexpr std::array vectors{VectorField{"force", &CycleRecord::force_W_N},
                              VectorField{"p_hat", &CycleRecord::p_hat_W_m},
                              VectorField{"proxy", &CycleRecord::proxy_W_m},
                              VectorField{"contact_force", &CycleRecord::contact_force_W_N},
+                             VectorField{"contact_torque", &CycleRecord::contact_torque_W_Nm},
                              VectorField{"normal", &CycleRecord::normal_W},
                              VectorField{"tool", &CycleRecord::tool_W_m}};
 

@@ -27,6 +27,8 @@ TEST(Moment, IsOnTheWireWhereItsNamesSay) {
   moment.record.proxy_W_m = {0.1, 0.2, 0.3};
   moment.record.flags = 1u << 25;
   moment.record.proxy_mass_kg = 3.75;
+  moment.record.proxy_inertia_kg_m2 = 0.03;
+  moment.record.contact_torque_W_Nm = {0.0, 0.0, -0.5};
   moment.handle_mass_kg = 0.25;
   models::Pose X = models::Pose::Identity();
   X.translation() = models::Vec3(1, 2, 3);
@@ -37,6 +39,8 @@ TEST(Moment, IsOnTheWireWhereItsNamesSay) {
   EXPECT_EQ(number_at(bytes, 1 + place_of("proxy_y")), 0.2);
   EXPECT_EQ(number_at(bytes, 1 + place_of("flags")), 33554432.0);
   EXPECT_EQ(number_at(bytes, 1 + place_of("mass_kg")), 4.0);
+  EXPECT_EQ(number_at(bytes, 1 + place_of("inertia_kg_m2")), 0.03);
+  EXPECT_EQ(number_at(bytes, 1 + place_of("contact_torque_z")), -0.5);
   std::array<float, 7> pose{};
   std::memcpy(pose.data(), bytes.data() + 8 * (1 + field_names().size()), sizeof pose);
   EXPECT_EQ(pose, (std::array<float, 7>{1, 2, 3, 0, 0, 0, 1}));
