@@ -186,7 +186,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "1000 kg; write the number alone"},
         Mistake{"tool:", "tool: [1, 2]\ntool2:", "tool: found a list of 2, expected a map"},
         Mistake{"buses:", "busses:",
-                "buses: found nothing, expected a list of 1 to 16 entries; is \"busses\" below meant"}));
+                "buses: found nothing, expected a list of 0 to 16 entries; is \"busses\" below meant"}));
 
 TEST(Cell, LinesAreThoseOfTheFile) {
   Changed cell(fixed_cell);

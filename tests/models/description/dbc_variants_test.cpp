@@ -57,7 +57,7 @@ const Variant variants[] = {
     {"DOS line ends and tabs",
      "VERSION \"\"\r\n\r\nBU_: S R\r\nBO_ 256 GRIP: 8 S\r\n\tSG_ Fx : 0|16@1- (0.5,0) [0|0] \"N\" R\r\n"},
     {"no new symbols, no nodes", GRIP},
-    {"nodes over two lines", "BU_: S R\n T U\n" GRIP, "which ends T"},
+    {"nodes over two lines", "BU_: S R\n T U\n" GRIP},
     {"a number in another form", "BO_ 256 GRIP: 8 S\n SG_ Fx : 0|16@1- (5E-1,-0.0) [-1.5e+3|1500.0] \"N\" R\n"},
     {"a factor that is none", "BO_ 257 BAD: 8 S\n SG_ Fx : 0|16@1- (x,0) [0|0] \"N\" R\n" GRIP,
      "own.dbc:2: not DBC: found \"x\", expected the factor"},
