@@ -28,8 +28,8 @@ class RecordedSession {
 
   [[nodiscard]] std::size_t size() const noexcept { return signals_.size(); }
   [[nodiscard]] const std::vector<RecordedEvent>& events() const noexcept { return events_; }
-  // The index to open the record at: the fault, else where a contact has lasted 0.1 s, else the end of the longest contact,
-  // else the beginning.
+  // The index to open the record at: the fault, else where a contact has lasted 0.1 s, else the end of the longest
+  // contact, else the beginning.
   [[nodiscard]] std::size_t opening() const noexcept { return opening_; }
   [[nodiscard]] double time_s(std::size_t index) const;
   // The fault, as the black box or the summary tells it; empty if there was none.
