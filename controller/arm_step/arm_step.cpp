@@ -48,9 +48,9 @@ constexpr double first_ease = 1.0, next_ease = 4.0, whole_box = 256.0;
 // The wrist is nearly singular where the sine of the middle one of its angles is less.
 constexpr double near_singular = 0.3;
 constexpr int most_rounds = 8;
-constexpr int bisections = 8;         // of the way from braking to a step: to 0.4 % of it
+constexpr int bisections = 8;        // of the way from braking to a step: to 0.4 % of it
 constexpr double coming_back = 0.1;  // of what braking is beyond the sets of turning
-constexpr double alike = 1e-3;        // of half-spaces' normals: the sine of the angle between them
+constexpr double alike = 1e-3;       // of half-spaces' normals: the sine of the angle between them
 constexpr double rounding_rad = 1e-12;
 constexpr std::size_t first_point = 2;  // the first joint whose place is limited; the two before it hardly move
 
