@@ -36,7 +36,8 @@ class ProgramTest(unittest.TestCase):
     """Runs the program in a folder of the test's own, so that what it writes by default lands there."""
 
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="proxarm-test-")
+        # A killed session's black box is still being written, by the process that outlives it for that.
+        folder = tempfile.TemporaryDirectory(prefix="proxarm-test-", ignore_cleanup_errors=True)
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
