@@ -65,6 +65,9 @@ def listener_to_sync(interface):
     return listener
 
 
+LISTENS_S = 0.3  # a controller hears who leads the bus before it asks anybody
+
+
 class CanplayerAsTheFarEnd(two.VcanTestCase):
     @classmethod
     def setUpClass(cls):
@@ -80,7 +83,7 @@ class CanplayerAsTheFarEnd(two.VcanTestCase):
         set_up, cycles = logs
         with arm, two.candump(*two.INTERFACES) as witness, listener_to_sync("vcan0") as sync, \
                 two.controller(two.THREE, DURATION) as run:
-            time.sleep(0.05)
+            time.sleep(LISTENS_S + 0.02)
             with canplayer(self.folder / "set_up.log", set_up):
                 sync.recv(16)
                 with canplayer(self.folder / "cycles.log", cycles):
