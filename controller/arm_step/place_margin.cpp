@@ -24,6 +24,13 @@ constexpr double meeting_m = 1e-6;
 // later instead. With 0.03, σ changed so fast there that its border led the tool against the hand.
 constexpr double damped_at = 0.3;
 
+// The Jacobian of another point of the tool, at this way from T.
+PlaceMargin::Columns jacobian_of(const models::ToolKinematics& at, const Vec3& from_T_W) noexcept {
+  PlaceMargin::Columns J = at.J_W.topRows<3>();
+  for (Eigen::Index i = 0; i < J.cols(); ++i) J.col(i) += Vec3(at.J_W.col(i).tail<3>()).cross(from_T_W);
+  return J;
+}
+
 }  // namespace
 
 PlaceMargin::PlaceMargin(const models::Arm& arm, const models::ToolSpace& space)
@@ -44,11 +51,9 @@ PlaceMargin::PlaceMargin(const models::Arm& arm, const models::ToolSpace& space)
 }
 
 bool PlaceMargin::axes_meet(const models::ToolKinematics& at) const noexcept {
-  const Vec3 from_T_W = at.joint_W[wrist_] - at.X_WT.translation();
-  for (Eigen::Index i = 0; i < at.J_W.cols(); ++i) {
-    if (carries(i)) continue;
-    const Vec3 moves_W = at.J_W.col(i).head<3>() + Vec3(at.J_W.col(i).tail<3>()).cross(from_T_W);
-    if (moves_W.norm() > meeting_m) return false;
+  const Columns J = jacobian_of(at, at.joint_W[wrist_] - at.X_WT.translation());
+  for (Eigen::Index i = 0; i < J.cols(); ++i) {
+    if (!carries(i) && J.col(i).norm() > meeting_m) return false;
   }
   return true;
 }
@@ -57,9 +62,7 @@ PlaceMargin::Wrist PlaceMargin::wrist(const models::ToolKinematics& at) const no
   Wrist out{.J_W = at.J_W.topRows<3>(), .from_T_W = Vec3::Zero()};
   if (wrist_ == static_cast<std::size_t>(at.J_W.cols())) return out;
   out.from_T_W = at.joint_W[wrist_] - at.X_WT.translation();
-  for (Eigen::Index i = 0; i < out.J_W.cols(); ++i) {
-    out.J_W.col(i) += Vec3(at.J_W.col(i).tail<3>()).cross(out.from_T_W);
-  }
+  out.J_W = jacobian_of(at, out.from_T_W);
   if (apart_) hold_orientation(at, out);
   for (Eigen::Index i = 0; i < out.J_W.cols(); ++i) {
     if (!carries(i)) out.J_W.col(i).setZero();

@@ -1,10 +1,8 @@
 #include "fieldbus/cia402/silence_watch.hpp"
 
-#include <algorithm>
-#include <limits>
-
 #include "fieldbus/can/byte_order.hpp"
 #include "fieldbus/canopen/canopen_pdo.hpp"
+#include "fieldbus/cia402/drive_exchange.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -28,33 +26,12 @@ std::vector<SdoStep> words_steps(const ServoDrive& drive) {
 }  // namespace
 
 void ask_for_words(CanNetwork& network, std::span<const DriveSlot> drives) {
-  std::vector<SdoSequence> sequences;
-  sequences.reserve(drives.size());
-  for (const DriveSlot& slot : drives) {
-    sequences.emplace_back(network.bus(slot.bus), slot.drive->node(), slot.drive->description().bus,
-                           "drive of " + slot.drive->description().joint, words_steps(*slot.drive),
-                           slot.drive->settings().sdo);
-    sequences.back().start(network.now_ns());
-  }
-  const FrameHandler on_frame = [&](std::size_t bus, const TimedFrame& received) {
-    for (std::size_t i = 0; i < sequences.size(); ++i) {
-      if (drives[i].bus != bus) continue;
-      if (sequences[i].on_frame(received.frame, received.time_ns)) return;
-      if (drives[i].drive->on_frame(received.frame, received.time_ns)) return;
+  const FrameHandler to_drives = [&](std::size_t bus, const TimedFrame& received) {
+    for (const DriveSlot& slot : drives) {
+      if (slot.bus == bus && slot.drive->on_frame(received.frame, received.time_ns)) return;
     }
   };
-  constexpr std::int64_t forever = std::numeric_limits<std::int64_t>::max();
-  pump_frames(network, forever, on_frame, [&](std::int64_t now_ns) {
-    std::int64_t wake_ns = forever;
-    bool done = true;
-    for (SdoSequence& sequence : sequences) {
-      sequence.poll(now_ns);
-      if (sequence.finished()) continue;
-      done = false;
-      wake_ns = std::min(wake_ns, sequence.wake_ns(now_ns));
-    }
-    return done ? pump_done : wake_ns;
-  });
+  (void)exchange(network, drives, to_drives, words_steps);
 }
 
 std::uint32_t SilenceWatch::wanted_id() const noexcept { return pdo_id(PdoDirection::transmit, words_pdo, node_); }

@@ -19,7 +19,7 @@ constexpr int poses = 200;
 constexpr double rotor_share = 0.5, least_rotor_share = 0.03;
 constexpr double gear_Hz = 25.0, stiffest_gear_Hz = 150.0, least_stiffness_share = 0.1, damping_ratio = 0.05;
 constexpr double hand_N = 100.0;
-// Of a drive's torque, what friction and the speeds of the other joints leave, and how far links' masses may be off.
+// A tenth of a drive's torque is for friction and for the speeds of other joints; links may weigh a fifth more.
 constexpr double torque_share = 0.9, weight_margin = 1.2;
 // Of limits.max_force_N: what sensor and handle bear, and what the hands need that a cell is tried with.
 constexpr double most_force_N = 200.0, least_force_N = 60.0;
@@ -54,16 +54,16 @@ std::vector<Load> loads_of(const models::Arm& arm) {
 
 double squared(double x) { return x * x; }
 
-// Two digits are all that a rule of thumb is worth.
-double rounded(double x) {
-  if (!(x > 0.0)) return 0.0;
-  const double unit = std::pow(10.0, std::floor(std::log10(x)) - 1.0);
-  return std::round(x / unit) * unit;
-}
+// Two digits are all that a rule of thumb is worth: the unit of the second one.
+double second_digit(double x) { return std::pow(10.0, std::floor(std::log10(x)) - 1.0); }
 
-double rounded_down(double x) {
-  const double unit = std::pow(10.0, std::floor(std::log10(x)) - 1.0);
-  return std::floor(x / unit) * unit;
+double rounded(double x) { return x > 0.0 ? std::round(x / second_digit(x)) * second_digit(x) : 0.0; }
+
+double rounded_down(double x) { return std::floor(x / second_digit(x)) * second_digit(x); }
+
+// What a drive of this torque has beside the arm's weight in its worst pose.
+double left_Nm(double torque_Nm, const Load& load) {
+  return torque_share * torque_Nm - weight_margin * load.most_gravity;
 }
 
 // What a cell may say of a drive ends somewhere, and arms of kilometres or of a thousand tons are mistakes.
@@ -84,12 +84,11 @@ void require_possible(const models::Arm& arm, const description::DriveDescriptio
 void choose_torque(const ChainJoint& joint, const Load& load, double rotor, description::DriveDescription& drive,
                    std::vector<std::string>& remarks) {
   const double inertia = load.most_inertia + rotor, speed = drive.max_speed_rad_per_s;
-  const double usual = usual_per_s * speed, weight_Nm = weight_margin * load.most_gravity;
-  const double needed = (weight_Nm + inertia * usual) / torque_share + hand_N * load.most_lever;
-  const auto left_for = [&](double torque_Nm) { return (torque_share * torque_Nm - weight_Nm) / inertia; };
-  const bool plausible = left_for(joint.max_effort) >= least_per_s * speed;
+  const double usual = usual_per_s * speed;
+  const double needed = (weight_margin * load.most_gravity + inertia * usual) / torque_share + hand_N * load.most_lever;
+  const bool plausible = left_Nm(joint.max_effort, load) / inertia >= least_per_s * speed;
   drive.max_torque_Nm = plausible ? joint.max_effort : rounded(needed);
-  drive.max_acceleration_rad_per_s2 = rounded_down(std::min(usual, left_for(drive.max_torque_Nm)));
+  drive.max_acceleration_rad_per_s2 = rounded_down(std::min(usual, left_Nm(drive.max_torque_Nm, load) / inertia));
   if (plausible || !(joint.max_effort > 0.0)) return;
   char text[240];
   std::snprintf(
@@ -126,9 +125,9 @@ std::vector<std::string> size_drives(description::Cell& cell, const std::vector<
     drive.max_speed_rad_per_s =
         std::min(joint.max_speed > 0.0 ? joint.max_speed : usual, joint.slides ? fastest_m_per_s : fastest_rad_per_s);
     choose_torque(joint, load, rotor, drive, remarks);
-    const double left_Nm = torque_share * drive.max_torque_Nm - weight_margin * load.most_gravity;
-    if (left_Nm < bears_N * load.most_lever) {
-      bears_N = left_Nm / load.most_lever;
+    const double for_hand_Nm = left_Nm(drive.max_torque_Nm, load);
+    if (for_hand_Nm < bears_N * load.most_lever) {
+      bears_N = for_hand_Nm / load.most_lever;
       weakest = joint.name;
     }
     require_possible(arm, drive, urdf);

@@ -263,18 +263,18 @@ TEST(ArmStep, RefusesAPlaceThatIsNone) {
   EXPECT_EQ(step.link_rad(), before);
 }
 
+PlaceMargin margin_of(const models::Arm& arm, const JointVector& c) {
+  PlaceMargin margin(arm, models::tool_space(arm));
+  models::ToolKinematics at;
+  arm.kinematics(c, at);
+  margin.go_to(c, at);
+  return margin;
+}
+
 // σ falls to nearly nothing as the elbow stretches, and its gradient is that of finite differences of the whole.
 TEST(PlaceMargin, SeesAnElbowThatStretchesAndAWristAboveTheBase) {
-  const description::Cell cell = tests::shipped_cell("default");
-  const models::Arm arm(cell);
-  const models::InverseKinematics inverse(arm);
-  models::ToolKinematics at;
-  const auto margin_at = [&](const JointVector& c) {
-    PlaceMargin margin(arm, inverse.space());
-    arm.kinematics(c, at);
-    margin.go_to(c, at);
-    return margin;
-  };
+  const models::Arm arm(tests::shipped_cell("default"));
+  const auto margin_at = [&](const JointVector& c) { return margin_of(arm, c); };
   JointVector stretched = arm.start_rad();
   stretched[2] = -1.3;  // nearly straight
   const PlaceMargin margin = margin_at(stretched);
@@ -325,16 +325,8 @@ TEST(PlaceMargin, KnowsHowAToolMovesThatIsHeldByAWristWhoseAxesDontMeet) {
 // Its margin is near where the wrist comes above the base, and the gradient, in which the wrist's joints have a share,
 // is that of finite differences.
 TEST(PlaceMargin, SeesTheSingularitiesOfAWristWhoseAxesDontMeet) {
-  const description::Cell cell = tests::shipped_cell("cobot");
-  const models::Arm arm(cell);
-  const models::InverseKinematics inverse(arm);
-  models::ToolKinematics at;
-  const auto margin_at = [&](const JointVector& c) {
-    PlaceMargin margin(arm, inverse.space());
-    arm.kinematics(c, at);
-    margin.go_to(c, at);
-    return margin;
-  };
+  const models::Arm arm(tests::shipped_cell("cobot"));
+  const auto margin_at = [&](const JointVector& c) { return margin_of(arm, c); };
   Random random(72);
   int near = 0, by_the_wrist = 0;
   for (std::int64_t k = 0; k < scaled(2000, 500) && near < 40; ++k) {
