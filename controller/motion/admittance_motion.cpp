@@ -528,7 +528,8 @@ void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   if (ahead_) {
     ahead_->proxy_step.resume(arm_step_.link_rad() - ahead_s() * speed, period_s_ * speed);
     ahead_->proxy_filter.resume(filter.rad() - ahead_s() * speed, speed);
-    // Where joints that turn on lead the tool, which isn't straight: a proxy beside its own step would be moved there.
+    // Joints that go on at their speeds lead the tool along a curve. A proxy that isn't where its own step is would be
+    // moved there in the next cycle.
     const Vec3 c_W = q_W;
     q_W = ahead_->proxy_step.kinematics().X_WT.translation();
     ahead_->point.resume(c_W, q_W, velocity_W);

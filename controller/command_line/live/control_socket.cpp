@@ -46,7 +46,7 @@ constexpr auto patience = std::chrono::seconds(2);  // with somebody who connect
 constexpr auto retry_after =
     std::chrono::milliseconds(10);  // what keeps accept from succeeding lasts longer than a call
 constexpr auto time_for_a_line = std::chrono::milliseconds(50);  // from connecting, where descriptors are scarce
-// Of a session that is alive: orders and a status take some milliseconds, changes are judged, which may take longer.
+// A live session answers orders and a status in some milliseconds. Changes are judged first, which may take longer.
 constexpr int answer_within_ms = 5000, status_within_ms = 1000;
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& found, const std::string& expected) {

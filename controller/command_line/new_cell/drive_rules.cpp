@@ -21,7 +21,7 @@ constexpr double gear_Hz = 25.0, stiffest_gear_Hz = 150.0, least_stiffness_share
 constexpr double hand_N = 100.0;
 // A tenth of a drive's torque is for friction and for the speeds of other joints; links may weigh a fifth more.
 constexpr double torque_share = 0.9, weight_margin = 1.2;
-// Of limits.max_force_N: what sensor and handle bear, and what the hands need that a cell is tried with.
+// limits.max_force_N is at most what sensor and handle bear, and at least what a new cell's first hands need.
 constexpr double most_force_N = 200.0, least_force_N = 60.0;
 // Accelerations as shares of the speed: the usual one (a 15th of a second to full speed), and the least that a drive is
 // believed to be made for.
