@@ -235,15 +235,17 @@ bool ArmStep::Box::contains(const JointVector& u) const noexcept {
 }
 
 // How far σ may fall in this step: towards its border as towards any other, and never below what braking makes of it.
-double ArmStep::place_bound() const noexcept {
+double ArmStep::place_bound(const PlaceMargin::Border& border) const noexcept {
   const double share = period_s_ / (period_s_ + brakes_s_);
-  return std::max(std::max(0.0, share * (margin_.value() - margin_.least())), least(-margin_.gradient()));
+  return std::max(std::max(0.0, share * (border.value - margin_.least())), least(-border.gradient));
 }
 
 // `u` is the step to the inverse kinematics' solution.
 bool ArmStep::allows(const JointVector& u) const noexcept {
   if (!box_.contains(u)) return false;
-  if (margin_.near() && -margin_.gradient().dot(u) > place_bound() + rounding_rad) return false;
+  for (const PlaceMargin::Border& border : margin_.near()) {
+    if (-border.gradient.dot(u) > place_bound(border) + rounding_rad) return false;
+  }
   return !points_too_fast(u, &solution_.kinematics);
 }
 
@@ -320,7 +322,7 @@ bool ArmStep::cut(const Vec3& q_W, const Vec3& q_k1_W, LimitPlane<3>& out) noexc
   const auto wanted_for = [&](const Vec3& from_T_W) { return q_W + from_T_W - here_W + wrist_.J_W * model_.u; };
   Vec3 wanted = wanted_for(wrist_wanted_W_) - wrist_.by_turning_W * turn_from(model_, aim_);
   if (can_carry_wrist(wanted)) return false;
-  if (!start_.held) {
+  if (!start_.held || catches_up_) {
     wanted = wanted_for(wrist_.from_T_W);
     if (can_carry_wrist(wanted)) return false;
   }
@@ -384,7 +386,9 @@ void ArmStep::add_sets() noexcept {
   first_set_ = program_.rows();
   program_.within(box_.low, box_.high);
   box_rows_ = program_.rows() - first_set_;
-  if (margin_.near()) add_set(-margin_.gradient(), place_bound(), Limit::singularity);
+  for (const PlaceMargin::Border& border : margin_.near()) {
+    add_set(-border.gradient, place_bound(border), Limit::singularity);
+  }
   for (std::size_t k = 0; k < row_count_; ++k) add_set(rows_[k].a, rows_[k].b, rows_[k].limit);
 }
 

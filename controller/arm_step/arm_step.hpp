@@ -126,7 +126,7 @@ class ArmStep final : public FollowableStep {
   [[nodiscard]] models::JointVector hardest_braking() const noexcept;
   [[nodiscard]] double least(const models::JointVector& a) const noexcept;
   [[nodiscard]] double room_rad(std::size_t i, double sign) const noexcept;
-  [[nodiscard]] double place_bound() const noexcept;
+  [[nodiscard]] double place_bound(const PlaceMargin::Border& border) const noexcept;
   [[nodiscard]] bool allows(const models::JointVector& u) const noexcept;
   void use_box(double ease) noexcept;
   void use_first_box() noexcept;

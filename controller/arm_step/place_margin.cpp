@@ -34,7 +34,8 @@ PlaceMargin::Columns jacobian_of(const models::ToolKinematics& at, const Vec3& f
 }  // namespace
 
 PlaceMargin::PlaceMargin(const models::Arm& arm, const models::ToolSpace& space)
-    : arm_(&arm), space_(space), weights_(arm.axes()), gradient_(JointVector::Zero(arm.axes())) {
+    : arm_(&arm), space_(space), weights_(arm.axes()) {
+  for (Border& border : borders_) border.gradient = JointVector::Zero(arm.axes());
   const models::JointMatrix C = arm.path_curvature();
   for (Eigen::Index i = 0; i < weights_.size(); ++i) weights_[i] = C.row(i).norm();
   const auto axes = static_cast<std::size_t>(arm.axes());
@@ -45,7 +46,7 @@ PlaceMargin::PlaceMargin(const models::Arm& arm, const models::ToolSpace& space)
   models::ToolKinematics at;
   arm.kinematics(arm.start_rad(), at);
   apart_ = axes >= 6 && !axes_meet(at);
-  least_ = std::min(least_m_per_rad, share_of_start * smallest(wrist(at).J_W).value);
+  least_ = std::min(least_m_per_rad, share_of_start * singular(wrist(at).J_W).value[0]);
   near_below_ = least_ + near_m_per_rad;
   from_rad_ = arm.start_rad();
 }
@@ -85,7 +86,7 @@ void PlaceMargin::hold_orientation(const models::ToolKinematics& at, Wrist& wris
   }
 }
 
-PlaceMargin::Smallest PlaceMargin::smallest(const Columns& J) const noexcept {
+PlaceMargin::Singular PlaceMargin::singular(const Columns& J) const noexcept {
   // In the directions in which T can't go, J is zero; a large value there leaves the smallest of the others.
   models::Mat6 squared = models::Mat6::Identity() * 1e6;
   squared.topLeftCorner<3, 3>() = J * J.transpose();
@@ -93,9 +94,7 @@ PlaceMargin::Smallest PlaceMargin::smallest(const Columns& J) const noexcept {
     squared.topLeftCorner<3, 3>() += 1e6 * space_.axes.col(k) * space_.axes.col(k).transpose();
   }
   const models::SymmetricEigen eigen = models::symmetric_eigen(squared);
-  Smallest out{std::sqrt(std::max(0.0, eigen.values[0])), eigen.vectors.col(0).head<3>(), {}};
-  out.right = out.value > 0.0 ? JointVector(J.transpose() * out.left / out.value) : JointVector::Zero(J.cols());
-  return out;
+  return {eigen.values.head<3>().cwiseMax(0.0).cwiseSqrt(), eigen.vectors.topLeftCorner<3, 3>()};
 }
 
 // Of three squares λ₁ ≤ λ₂ ≤ λ₃ of singular values, λ₁ ≥ λ₁λ₂λ₃ / ((λ₁ + λ₂ + λ₃)/2)².
@@ -108,8 +107,8 @@ bool PlaceMargin::surely_clear(const Columns& J) const noexcept {
 void PlaceMargin::go_to(const JointVector& c_rad, const models::ToolKinematics& at) noexcept {
   if (apart_) {
     const Columns J = wrist(at).J_W;
-    near_ = !surely_clear(J);
-    if (near_) measure(c_rad, J);
+    near_ = 0;
+    if (!surely_clear(J)) measure(c_rad, J);
     return;
   }
   const double moved = weights_.dot((c_rad - from_rad_).cwiseAbs());
@@ -117,15 +116,20 @@ void PlaceMargin::go_to(const JointVector& c_rad, const models::ToolKinematics& 
   measure(c_rad, wrist(at).J_W);
 }
 
-// dσ = leftᵀ dJ right. The first joint moves all of the arm as one, and those from the wrist on don't move it where
-// their axes meet: σ stays.
+// dσ = leftᵀ dJ right, right = Jᵀ left / σ. The first joint moves all of the arm as one, and those from the wrist on
+// don't move it where their axes meet: σ stays.
 void PlaceMargin::measure(const JointVector& c_rad, const Columns& J) noexcept {
-  const Smallest now = smallest(J);
+  const Singular now = singular(J);
   from_rad_ = c_rad;
-  value_ = now.value;
-  near_ = value_ < near_below_;
-  clear_ = near_ ? -1.0 : value_ - near_below_;
-  if (!near_) return;
+  near_ = 0;
+  std::array<JointVector, 3> right;
+  for (int k = 0; k < 3 && now.value[k] < near_below_; ++k) {
+    const JointVector along = J.transpose() * now.left.col(k);
+    right[near_] = now.value[k] > 0.0 ? JointVector(along / now.value[k]) : JointVector::Zero(J.cols());
+    borders_[near_++].value = now.value[k];
+  }
+  clear_ = near_ > 0 ? -1.0 : now.value[0] - near_below_;
+  if (near_ == 0) return;
   models::ToolKinematics beside;
   const std::size_t last = apart_ ? static_cast<std::size_t>(c_rad.size()) : wrist_;
   for (std::size_t k = 1; k < last; ++k) {
@@ -134,7 +138,9 @@ void PlaceMargin::measure(const JointVector& c_rad, const Columns& J) noexcept {
     c[i] += nudge_rad;
     arm_->kinematics(c, beside);
     const Columns change = wrist(beside).J_W - J;
-    gradient_[i] = now.left.dot(change * now.right) / nudge_rad;
+    for (std::size_t b = 0; b < near_; ++b) {
+      borders_[b].gradient[i] = now.left.col(static_cast<int>(b)).dot(change * right[b]) / nudge_rad;
+    }
   }
 }
 

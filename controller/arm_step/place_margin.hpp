@@ -1,9 +1,11 @@
 // How far the arm is from the poses in which its place is lost: stretched or folded (elbow), or with its wrist above
 // its first axis (shoulder).
 //
-//   σ(c) = the smallest singular value of J_w(c), in m/rad
+//   σ(c) = a singular value of J_w(c), in m/rad
 // J_w: the Jacobian of the wrist's place, by the joints that carry it. With the orientation held, T goes where the
-// wrist goes, so σ is what the slowest direction of the tool has of a joint's turn. The wrist is the origin of the last
+// wrist goes, so the smallest σ is what the slowest direction of the tool has of a joint's turn. Each of them has a
+// border of its own: where an arm comes near to two singularities at once, the one that is further off ends the step,
+// too, and which of them is the smallest may change from step to step. The wrist is the origin of the last
 // joint but one, and the last three joints turn the tool about it. An arm with fewer than six axes has no such wrist:
 // there J_w is that of T in the directions in which T can go (tool_space.hpp).
 //
@@ -21,6 +23,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 
 #include "models/arm/arm.hpp"
 #include "models/arm/tool_space.hpp"
@@ -38,10 +41,12 @@ class PlaceMargin {
 
   // The links have gone on from the last angles that were told to c_rad. Precondition: `at` is the kinematics at c_rad.
   void go_to(const models::JointVector& c_rad, const models::ToolKinematics& at) noexcept;
-  // Whether σ is near enough to its border that a step might matter; only then are the next two known.
-  [[nodiscard]] bool near() const noexcept { return near_; }
-  [[nodiscard]] double value() const noexcept { return value_; }
-  [[nodiscard]] const models::JointVector& gradient() const noexcept { return gradient_; }
+  struct Border {
+    double value = 0.0;            // σ, m/rad
+    models::JointVector gradient;  // of σ by the joints, m/rad²
+  };
+  // The σ that are so near to their border that a step might matter, the smallest first.
+  [[nodiscard]] std::span<const Border> near() const noexcept { return {borders_.data(), near_}; }
 
   // Whether the joint of this drive carries the wrist; the others only turn the tool about it.
   [[nodiscard]] bool carries(Eigen::Index joint) const noexcept { return carries_[static_cast<std::size_t>(joint)]; }
@@ -56,13 +61,13 @@ class PlaceMargin {
   [[nodiscard]] Wrist wrist(const models::ToolKinematics& at) const noexcept;
 
  private:
-  struct Smallest {
-    double value;
-    models::Vec3 left;  // singular vectors
-    models::JointVector right;
+  // Of J: values from the smallest on, and their left vectors.
+  struct Singular {
+    models::Vec3 value;
+    models::Mat3 left;
   };
 
-  [[nodiscard]] Smallest smallest(const Columns& J) const noexcept;
+  [[nodiscard]] Singular singular(const Columns& J) const noexcept;
   void measure(const models::JointVector& c_rad, const Columns& J) noexcept;
   [[nodiscard]] bool axes_meet(const models::ToolKinematics& at) const noexcept;
   void hold_orientation(const models::ToolKinematics& at, Wrist& wrist) const noexcept;
@@ -75,9 +80,10 @@ class PlaceMargin {
   std::size_t wrist_ = 0;  // index of the joint whose origin is the wrist; axes(): T itself
   bool apart_ = false;     // the last three axes don't meet there
   double least_ = 0.0, near_below_ = 0.0;
-  models::JointVector from_rad_, gradient_;
-  double value_ = 0.0, clear_ = -1.0;
-  bool near_ = false;
+  models::JointVector from_rad_;
+  double clear_ = -1.0;
+  std::array<Border, 3> borders_;
+  std::size_t near_ = 0;
 };
 
 }  // namespace proxarm::controller

@@ -271,6 +271,8 @@ PlaceMargin margin_of(const models::Arm& arm, const JointVector& c) {
   return margin;
 }
 
+const PlaceMargin::Border& smallest(const PlaceMargin& margin) { return margin.near().front(); }
+
 // σ falls to nearly nothing as the elbow stretches, and its gradient is that of finite differences of the whole.
 TEST(PlaceMargin, SeesAnElbowThatStretchesAndAWristAboveTheBase) {
   const models::Arm arm(tests::shipped_cell("default"));
@@ -278,19 +280,19 @@ TEST(PlaceMargin, SeesAnElbowThatStretchesAndAWristAboveTheBase) {
   JointVector stretched = arm.start_rad();
   stretched[2] = -1.3;  // nearly straight
   const PlaceMargin margin = margin_at(stretched);
-  ASSERT_TRUE(margin.near());
-  EXPECT_LT(margin.value(), 0.15);
+  ASSERT_FALSE(margin.near().empty());
+  EXPECT_LT(smallest(margin).value, 0.15);
   for (Eigen::Index i = 0; i < 6; ++i) {
     JointVector more = stretched, less = stretched;
     more[i] += 1e-4;
     less[i] -= 1e-4;
-    const double slope = (margin_at(more).value() - margin_at(less).value()) / 2e-4;
-    EXPECT_NEAR(margin.gradient()[i], slope, 1e-4) << i;
+    const double slope = (smallest(margin_at(more)).value - smallest(margin_at(less)).value) / 2e-4;
+    EXPECT_NEAR(smallest(margin).gradient[i], slope, 1e-4) << i;
   }
   // The wrist's own singularity is none of the place.
   JointVector wrist = arm.start_rad();
   wrist[4] = 0.0;
-  EXPECT_FALSE(margin_at(wrist).near());
+  EXPECT_TRUE(margin_at(wrist).near().empty());
 }
 
 // The last three axes of the cobot don't meet in a point, so that its wrist's joints move the tool while they hold its
@@ -334,14 +336,14 @@ TEST(PlaceMargin, SeesTheSingularitiesOfAWristWhoseAxesDontMeet) {
     for (Eigen::Index i = 0; i < 6; ++i) q[i] = random.uniform(arm.lower_rad()[i], arm.upper_rad()[i]);
     const PlaceMargin margin = margin_at(q);
     // Where two singular values meet, there is no gradient: they are well below those of the rest.
-    if (!margin.near() || margin.value() > 0.05 || std::abs(std::sin(q[4])) < 0.3) continue;
+    if (margin.near().empty() || smallest(margin).value > 0.05 || std::abs(std::sin(q[4])) < 0.3) continue;
     ++near;
     for (Eigen::Index i = 0; i < 6; ++i) {
       JointVector more = q, less = q;
       more[i] += 1e-5;
       less[i] -= 1e-5;
-      const double slope = (margin_at(more).value() - margin_at(less).value()) / 2e-5;
-      EXPECT_NEAR(margin.gradient()[i], slope, 1e-3) << k << " " << i;
+      const double slope = (smallest(margin_at(more)).value - smallest(margin_at(less)).value) / 2e-5;
+      EXPECT_NEAR(smallest(margin).gradient[i], slope, 1e-3) << k << " " << i;
       if (i > 2 && std::abs(slope) > 0.02) ++by_the_wrist;
     }
   }
@@ -364,11 +366,49 @@ TEST(PlaceMargin, IsNeverCalledClearWhereItIsNear) {
     arm.kinematics(q, at);
     margin.go_to(q, at);
     const Eigen::JacobiSVD<Eigen::MatrixXd> svd(Eigen::MatrixXd(margin.wrist(at).J_W));
-    EXPECT_EQ(margin.near(), svd.singularValues()[2] < margin.least() + 0.1) << k;
-    clear += margin.near() ? 0 : 1;
+    EXPECT_EQ(margin.near().empty(), svd.singularValues()[2] >= margin.least() + 0.1) << k;
+    clear += margin.near().empty() ? 1 : 0;
     ++poses;
   }
   EXPECT_GT(clear, poses / 4);
+}
+
+// A small arm was thrown where its two smallest singular values changed places: the one that had been further off
+// became the border, unseen until then. Each that is near has a border of its own, with the slope that it has by finite
+// differences of singular values that another method finds.
+TEST(PlaceMargin, GivesEachSmallSingularValueABorderOfItsOwn) {
+  const models::Arm arm(tests::shipped_cell("cobot"));
+  PlaceMargin margin(arm, models::tool_space(arm));
+  models::ToolKinematics at;
+  const auto values_at = [&](const JointVector& q) {
+    arm.kinematics(q, at);
+    const Vec3 falling = Eigen::JacobiSVD<Eigen::MatrixXd>(Eigen::MatrixXd(margin.wrist(at).J_W)).singularValues();
+    return Vec3(falling.reverse());
+  };
+  Random random(74);
+  int two_near = 0;
+  for (std::int64_t k = 0; k < scaled(40000, 20000) && two_near < 20; ++k) {
+    JointVector q(6);
+    for (Eigen::Index i = 0; i < 6; ++i) q[i] = random.uniform(arm.lower_rad()[i], arm.upper_rad()[i]);
+    const Vec3 values = values_at(q);
+    margin.go_to(q, at);
+    ASSERT_EQ(margin.near().size(), static_cast<std::size_t>((values.array() < margin.least() + 0.1).count())) << k;
+    // Apart by so much that both have a slope, over 1e-5 rad, to the digits that are asked for below.
+    if (margin.near().size() < 2 || values[1] - values[0] < 0.02 || values[0] < 0.01) continue;
+    ++two_near;
+    for (int b = 0; b < 2; ++b) {
+      const PlaceMargin::Border& border = margin.near()[static_cast<std::size_t>(b)];
+      EXPECT_NEAR(border.value, values[b], 1e-9) << k << " " << b;
+      for (Eigen::Index i = 0; i < 6; ++i) {
+        JointVector more = q, less = q;
+        more[i] += 1e-5;
+        less[i] -= 1e-5;
+        const double slope = (values_at(more)[b] - values_at(less)[b]) / 2e-5;
+        EXPECT_NEAR(border.gradient[i], slope, 1e-3) << k << " " << b << " " << i;
+      }
+    }
+  }
+  EXPECT_GE(two_near, 5);
 }
 
 }  // namespace
