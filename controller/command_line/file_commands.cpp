@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/entry/exit_status.hpp"
@@ -9,6 +10,7 @@
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/trials/cycle_work.hpp"
+#include "controller/plausibility/doubts.hpp"
 #include "controller/session/bring_up.hpp"
 #include "fieldbus/cia402/cia402_bring_up.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
@@ -35,6 +37,10 @@ namespace proxarm::command_line {
 namespace {
 
 namespace fs = std::filesystem;
+
+void tell(const std::vector<std::string>& lines) {
+  for (const std::string& line : lines) std::printf("%s\n", line.c_str());
+}
 
 // Assumption 1 and the laws of each object and the whole, with the worst figures. What the scene is; null if it is
 // wrong.
@@ -63,6 +69,9 @@ const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOpti
         "the laws of its objects, tried with a point; whether its tool fits is told by `proxarm check CELL --scene`\n",
         stdout);
   }
+  // How far its objects are from a tool is told with a cell.
+  const double anywhere_m = std::numeric_limits<double>::infinity();
+  tell(controller::scene_doubts(scene, models::Vec3::Zero(), anywhere_m));
   return check_laws(scene, options);
 }
 
@@ -97,12 +106,12 @@ void check_cell(const fs::path& file, const fs::path& scene) {
   run.cell = file;
   run.scene = scene;
   const PreparedSession session = prepare(run);
+  tell(surprises(session));
   require_runnable(session, run);
-  for (const std::string& line : surprises(session)) std::printf("%s\n", line.c_str());
   require_simulable(session);
   std::vector<fieldbus::DriveSlot> slots;
   for (fieldbus::ServoDrive& servo : servos) slots.push_back({&servo, 0});
-  for (const std::string& lack : fieldbus::losses_of(slots)) std::printf("%s\n", lack.c_str());
+  tell(fieldbus::losses_of(slots));
 }
 
 void tell_sources(const fs::path& file) {
@@ -118,7 +127,7 @@ void tell_sources(const fs::path& file) {
 // What is wrong with a mesh is told; whether that matters is for its scene to say. Returns what is fine.
 const char* tell_mesh(const fs::path& file) {
   const scenes::LoadedMesh loaded = scenes::load_mesh(file, {});
-  for (const std::string& line : scenes::mesh_report(loaded)) std::printf("%s\n", line.c_str());
+  tell(scenes::mesh_report(loaded));
   return scenes::is_a_body(loaded)
              ? "mesh"
              : "mesh for a point tool; with a rigid tool it is refused, as an object and as the tool";
@@ -133,10 +142,10 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       description::load_modbus_drive(file);
       return "register map of a Modbus drive";
     case FileKind::eds:
-      for (const std::string& remark : description::load_eds(file).remarks) std::printf("%s\n", remark.c_str());
+      tell(description::load_eds(file).remarks);
       return "description of a CANopen device";
     case FileKind::dbc:
-      for (const std::string& remark : description::load_dbc(file).remarks) std::printf("%s\n", remark.c_str());
+      tell(description::load_dbc(file).remarks);
       return "list of messages and signals";
     case FileKind::sensor:
       description::load_sensor(file);
@@ -146,7 +155,7 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       check_tool(file);
       return "tool";
     case FileKind::hand:
-      description::load_hand(file);
+      tell(controller::hand_doubts(description::load_hand(file)));
       return "hand";
     case FileKind::urdf:
       models::compile(models::load_urdf(file));

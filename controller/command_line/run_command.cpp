@@ -88,8 +88,8 @@ int run_command(const RunOptions& given) {
   if (!options.bus.simulated()) refuse_for_interfaces(options);
   PreparedSession session = prepare(options);
   know_zero(session, options);
-  require_runnable(session, options);
   for (const std::string& line : surprises(session)) std::fprintf(stderr, "proxarm: warning: %s\n", line.c_str());
+  require_runnable(session, options);
   refuse_view(session, options);
   require_changes(session, options);
   BlackBoxKeeper keeper(session, options);

@@ -7,6 +7,7 @@
 
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/limits/step_limits.hpp"
+#include "controller/plausibility/doubts.hpp"
 #include "controller/setpoints/held_weight.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/inverse_kinematics.hpp"
@@ -306,10 +307,14 @@ std::vector<std::string> surprises(const PreparedSession& session) {
   const models::Arm arm(session.cell);
   // No joint's axis is further from the tool than the arm can reach.
   const double reach_m = std::max(arm.path_curvature().maxCoeff(), 0.1);
-  std::vector<std::string> lines = weight_surprises(session, arm);
-  for (const std::string& line : hand_surprises(session)) lines.push_back(line);
+  std::vector<std::string> lines = controller::cell_doubts(session.cell, arm);
+  const auto add = [&](const std::vector<std::string>& more) { lines.insert(lines.end(), more.begin(), more.end()); };
+  add(controller::scene_doubts(session.scene, arm.tool_pose(arm.start_rad()).translation(), reach_m));
+  add(controller::hand_doubts(session.hand));
+  add(weight_surprises(session, arm));
+  add(hand_surprises(session));
   if (session.scene.tool) {
-    for (const std::string& line : tool_surprises(*session.scene.tool, reach_m)) lines.push_back(line);
+    add(tool_surprises(*session.scene.tool, reach_m));
   }
   for (const scenes::Object& object : session.scene.objects) {
     const auto* const mesh = std::get_if<scenes::MeshShape>(&object.shape);

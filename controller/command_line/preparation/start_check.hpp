@@ -12,10 +12,10 @@ namespace proxarm::command_line {
 // masses that aren't stable, and in simulation a timestep that a bus can't carry. Throws SetupError.
 void require_runnable(const PreparedSession& session, const RunOptions& options);
 
-// What isn't wrong but would surprise, a line each: a simulated hand that pushes before the sensor is tared, of the
-// scene's meshes (scenes/mesh_files/mesh_report.hpp), a rigid
-// tool that is longer than the arm, and where the arm's weight takes all that setpoints may ask of a drive
-// (controller/setpoints/held_weight.hpp).
+// What isn't wrong but would surprise, a line each, told before anything is refused: what is hardly meant, such as a
+// value in another unit (controller/plausibility/doubts.hpp), a simulated hand that pushes before the sensor is tared,
+// of the scene's meshes (scenes/mesh_files/mesh_report.hpp), a rigid tool that is longer than the arm, and where the
+// arm's weight takes all that setpoints may ask of a drive (controller/setpoints/held_weight.hpp).
 std::vector<std::string> surprises(const PreparedSession& session);
 
 // Throws SetupError for an arm that can't be built (URDF without a drive's joint, and the like), for axes whose tool

@@ -1,0 +1,128 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "controller/plausibility/doubts.hpp"
+#include "controller/plausibility/expected.hpp"
+#include "models/base/text.hpp"
+
+namespace proxarm::controller {
+
+namespace {
+
+using models::Vec3;
+using Lines = std::vector<std::string>;
+
+constexpr double degree = std::numbers::pi / 180.0;
+// An object that is further from the tool's start than this many reaches of the arm is never touched.
+constexpr double far_reaches = 10.0;
+const OtherUnit in_mm{"mm", 1e-3}, in_percent{"percent", 1e-2};
+const Expected friction{0.0, 3.0, "", {in_percent}};
+
+// How far a shape's surface is from a point, at least; absent for a mesh, of which its report speaks.
+std::optional<double> distance_m(const scenes::Shape& shape, const Vec3& from_W) {
+  if (const auto* plane = std::get_if<scenes::PlaneShape>(&shape)) {
+    return std::abs(plane->normal.normalized().dot(from_W - plane->point_m));
+  }
+  if (const auto* box = std::get_if<scenes::BoxShape>(&shape)) {
+    return std::max(0.0, (box->pose_W.translation() - from_W).norm() - 0.5 * box->size_m.norm());
+  }
+  if (const auto* sphere = std::get_if<scenes::SphereShape>(&shape)) {
+    return std::abs((sphere->centre_m - from_W).norm() - sphere->radius_m);
+  }
+  const auto along = [&](const Vec3& from_m, const Vec3& to_m, double radius_m) {
+    const double half_m = 0.5 * (to_m - from_m).norm();
+    return std::max(0.0, (0.5 * (from_m + to_m) - from_W).norm() - half_m - radius_m);
+  };
+  if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&shape)) {
+    return along(capsule->from_m, capsule->to_m, capsule->radius_m);
+  }
+  if (const auto* cylinder = std::get_if<scenes::CylinderShape>(&shape)) {
+    return along(cylinder->from_m, cylinder->to_m, cylinder->radius_m);
+  }
+  return std::nullopt;
+}
+
+class SceneDoubts {
+ public:
+  SceneDoubts(const scenes::Scene& scene, const Vec3& start_W, double reach_m)
+      : scene_(scene), start_W_(start_W), far_m_(far_reaches * reach_m) {}
+
+  Lines operator()() {
+    for (const scenes::Object& object : scene_.objects) judge_object(object);
+    for (const scenes::MediumDescription& medium : scene_.media) {
+      begin(medium.line, "medium");
+      value("damping_Ns_per_m", medium.damping_Ns_per_m, {0.0, 1e5, "Ns/m", {}});
+      value("force_N", medium.force_N, {0.0, 1000.0, "N", {}});
+    }
+    if (scene_.coulomb_force_N) {
+      begin(scene_.coulomb_line, "scene");
+      value("coulomb_force_N", *scene_.coulomb_force_N, {0.0, 1000.0, "N", {}});
+    }
+    return std::move(lines_);
+  }
+
+ private:
+  void begin(int line, const std::string& name) {
+    where_ = scene_.file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": " + name + ": ";
+  }
+
+  void value(const char* key, double found, const Expected& expected) {
+    if (std::optional<std::string> line = doubt(key, found, expected)) lines_.push_back(where_ + *line);
+  }
+
+  void judge_object(const scenes::Object& object) {
+    begin(object.line, object.name);
+    value("friction", object.friction, friction);
+    for (const scenes::FrictionRegion& region : object.friction_regions) value("friction", region.friction, friction);
+    if (const std::optional<double> far = distance_m(object.shape, start_W_); far && *far > far_m_) {
+      lines_.push_back(where_ + "it is " + description::rounded_text(*far) +
+                       " m from where the tool starts, far beyond the arm's reach: are its places in metres?");
+    }
+    if (object.layer) {
+      value("layer.stiffness_N_per_m", object.layer->stiffness_N_per_m,
+            {20.0, 1e8, "N/m", {{"N/mm", 1e3}, {"kN/m", 1e3}, {"N/µm", 1e6}}});
+      value("layer.thickness_m", object.layer->thickness_m, {1e-6, 1.0, "m", {in_mm}});
+    }
+    if (!object.motion) return;
+    value("motion.velocity_m_per_s", object.motion->velocity_m_per_s.norm(), {0.0, 5.0, "m/s", {{"mm/s", 1e-3}}});
+    value("motion.amplitude_m", object.motion->amplitude_m.norm(), {0.0, 5.0, "m", {in_mm}});
+    value("motion.turn_rad_per_s", std::abs(object.motion->turn_rad_per_s),
+          {0.0, 20.0, "rad/s", {{"degrees/s", degree}}});
+  }
+
+  const scenes::Scene& scene_;
+  Vec3 start_W_;
+  double far_m_;
+  std::string where_;
+  Lines lines_;
+};
+
+}  // namespace
+
+std::vector<std::string> scene_doubts(const scenes::Scene& scene, const Vec3& start_W, double reach_m) {
+  return SceneDoubts(scene, start_W, reach_m)();
+}
+
+std::vector<std::string> hand_doubts(const description::HandDescription& hand) {
+  Lines lines;
+  judge("mass_kg", hand.mass_kg, {0.0, 30.0, "kg", {{"g", 1e-3}}}, lines);
+  if (hand.stiffness_N_per_m > 0.0) {
+    judge("stiffness_N_per_m", hand.stiffness_N_per_m, {5.0, 1e6, "N/m", {{"N/mm", 1e3}, {"N/cm", 1e2}}}, lines);
+  }
+  judge("damping_Ns_per_m", hand.damping_Ns_per_m, {0.0, 5000.0, "Ns/m", {}}, lines);
+  judge("max_force_N", hand.max_force_N, {0.5, 3000.0, "N", {{"kN", 1e3}}}, lines);
+  for (const description::Waypoint& waypoint : hand.waypoints) {
+    for (const double x : waypoint.offset_m) judge("waypoints.offset_m", x, {-20.0, 20.0, "m", {in_mm}}, lines);
+    for (const double x : waypoint.turn_rad) {
+      judge("waypoints.turn_rad", x, {-10.0, 10.0, "rad", {{"degrees", degree}}}, lines);
+    }
+  }
+  for (const description::Sine& sine : hand.multisine) {
+    judge("multisine.amplitude_m", sine.amplitude_m, {-1.0, 1.0, "m", {in_mm}}, lines);
+  }
+  for (std::string& line : lines) line = hand.file.string() + ": " + line;
+  return lines;
+}
+
+}  // namespace proxarm::controller
