@@ -168,7 +168,9 @@ class ServoDrive final : public CyclicDrive {
   void set_up_torque();
   void lose_feedback(const MappedObject& object);
   void leave_out_what_eds_lacks();
-  [[nodiscard]] std::vector<SdoStep> profile_steps() const;
+  [[nodiscard]] std::vector<SdoStep> all_profile_steps() const;
+  [[nodiscard]] std::vector<SdoStep> profile_steps() const;  // without those that the cell has it skip
+  void note_skipped();
   bool decode_tpdo(const CanFrame& frame) noexcept;
   void judge_doubled() noexcept;
   [[nodiscard]] bool shows_mode() const noexcept { return !mode_byte_ || shown_mode_ == mode_.number; }

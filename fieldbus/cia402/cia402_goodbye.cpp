@@ -32,7 +32,7 @@ void Goodbye::begin(std::int64_t now_ns) noexcept {
 
 bool Goodbye::is_off(const ServoDrive& drive, std::int64_t now_ns) const noexcept {
   if (drive.state() == DriveState::ready_to_switch_on) return now_ns - begun_ns_ >= patience_ns;
-  return is_switched_off(drive);
+  return is_switched_off(drive.state());
 }
 
 bool Goodbye::is_busy(std::size_t bus) const noexcept {

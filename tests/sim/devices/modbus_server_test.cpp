@@ -95,7 +95,7 @@ TEST_P(ModbusLines, TellExceptionsApart) {
   std::array<std::uint16_t, 3> read{};
   EXPECT_EQ(master->read(1, 1000, read), ModbusResult::exception);
   EXPECT_EQ(master->exception(), 2);  // illegal data address
-  device.set_fault(ModbusFault::exception);
+  device.set_fault(ModbusFault::exception, 4);
   EXPECT_EQ(master->read(1, 16, read), ModbusResult::exception);
   EXPECT_EQ(master->exception(), 4);  // server device failure
   device.set_fault(ModbusFault::none);
