@@ -38,6 +38,7 @@ class LibmodbusClient final : public ModbusClient {
  private:
   ModbusResult transact(const ModbusMessage& request, ModbusMessage& answer) noexcept override {
     if (!connected_ && !reconnect()) return ModbusResult::closed;
+    if (serial_) modbus_flush(context_.get());  // an answer that came too late is for no request any more
     modbus_set_slave(context_.get(), request.bytes[0]);
     if (modbus_send_raw_request(context_.get(), request.bytes.data(), static_cast<int>(request.size)) < 0) {
       return give_up();
