@@ -97,7 +97,7 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .mapping = rpdo_mapping(drive)}));
   // The last torque acts until this timer runs out: a drive without it would go on for as long as the heartbeat lasts.
   // It is all that stops a drive which doesn't watch the heartbeat.
-  if (mode_of(drive).torque || drive.bring_up.stops_by_setpoints) {
+  if (mode_of(drive).torque || drive.bring_up.stops_by == description::StopsBy::setpoint_timer) {
     for (SdoStep& step : steps) {
       if (step.object == ObjectAddress{0x1400, 5}) step.is_optional = false;
     }
@@ -138,10 +138,19 @@ void append_heartbeat(std::vector<SdoStep>& steps, std::uint32_t consumer) {
   for (const std::uint32_t value : {0U, consumer}) {
     SdoStep step = sdo_write({0x1016, 1}, 4, value, "consumer heartbeat time (of the controller)");
     step.advice =
-        "by this the drive stops when the controller is gone; where its setpoint timer (1400h:05) does, say bring_up: "
-        "{stops_by: setpoint_timer} at the drive in the cell, and try it: proxarm prove --bus-loss";
+        "by this the drive stops when the controller is gone; where life guarding (100Ch) or its setpoint timer "
+        "(1400h:05) does, say bring_up: {stops_by: life_guarding} or {stops_by: setpoint_timer} at the drive in the "
+        "cell, and try it: proxarm prove --bus-loss";
     steps.push_back(step);
   }
+}
+
+// The same by life guarding (CiA 301): the drive stops when nobody has asked for its state for guard time × factor.
+void append_life_guarding(std::vector<SdoStep>& steps, const DriveSettings& settings) {
+  for (const std::uint32_t time_ms : {0U, std::uint32_t{settings.master_heartbeat_ms}}) {
+    steps.push_back(sdo_write({0x100C, 0}, 2, time_ms, "guard time (of the controller)"));
+  }
+  steps.push_back(sdo_write({0x100D, 0}, 1, settings.life_time_factor(), "life time factor"));
 }
 
 // What is written before the PDOs are mapped, because the drive wants it so.
@@ -153,11 +162,12 @@ void append_start_up(std::vector<SdoStep>& steps, const description::BringUp& br
 }
 
 // What the drive does when we are gone or when it is told to stop. 1016h is a must, since it is what stops the arm when
-// the controller dies, unless the cell says that the setpoint timer does; the others have defaults in the standard that
+// the controller dies, unless the cell says what else does; the others have defaults in the standard that
 // stop it too.
 void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings,
                       const description::BringUp& bring_up) {
-  if (!bring_up.stops_by_setpoints) append_heartbeat(steps, settings.consumer_heartbeat());
+  if (bring_up.stops_by == description::StopsBy::heartbeat) append_heartbeat(steps, settings.consumer_heartbeat());
+  if (bring_up.stops_by == description::StopsBy::life_guarding) append_life_guarding(steps, settings);
   steps.push_back(sdo_write({0x1017, 0}, 2, settings.drive_heartbeat_ms, "producer heartbeat time"));
   steps.push_back(if_present(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));
   // Where it is the maker's: a fault or no voltage stops the arm, too. 0, no action, is refused.

@@ -156,6 +156,15 @@ bool ServoDrive::set_target_torque_Nm(double torque_Nm) noexcept {
   return true;
 }
 
+bool ServoDrive::guard_request(CanFrame& frame) const noexcept {
+  if (description_.bring_up.stops_by != description::StopsBy::life_guarding) return false;
+  frame = CanFrame{};
+  frame.id = heartbeat_id(node());
+  frame.remote = true;
+  frame.length = 1;  // of the answer
+  return true;
+}
+
 bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
   if (!heard_) return false;
   if (!following_) target_counts_ = actual_counts_;

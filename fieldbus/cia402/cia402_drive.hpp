@@ -10,6 +10,7 @@
 // drive applies it once its brake is open, and the axis falls where it isn't what holds it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -58,6 +59,10 @@ struct DriveSettings {
   // 1016h:01, by which a drive watches the controller.
   [[nodiscard]] std::uint32_t consumer_heartbeat() const noexcept {
     return static_cast<std::uint32_t>(master_node) << 16 | master_heartbeat_timeout_ms;
+  }
+  // 100Dh, of a drive that watches the controller by life guarding; 100Ch is the heartbeat's period.
+  [[nodiscard]] std::uint8_t life_time_factor() const noexcept {
+    return static_cast<std::uint8_t>(std::clamp(master_heartbeat_timeout_ms / master_heartbeat_ms, 1, 255));
   }
   void validate() const;  // throws SetupError
 };
@@ -115,6 +120,10 @@ class ServoDrive final : public CyclicDrive {
   bool set_target_torque_Nm(double torque_Nm) noexcept;
   // The RPDO of this cycle; false while no position is known yet, and then nothing may be sent.
   bool encode_rpdo(CanFrame& frame) noexcept override;
+
+  // Asks for its NMT state: a drive that watches the controller by life guarding wants that as often as a heartbeat
+  // comes. False: it doesn't.
+  [[nodiscard]] bool guard_request(CanFrame& frame) const noexcept;
 
   // ---- what is known of the drive ----
   [[nodiscard]] bool fresh() const noexcept override { return fresh_; }  // a TPDO came since the last SYNC

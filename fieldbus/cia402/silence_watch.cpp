@@ -12,7 +12,11 @@ constexpr std::uint16_t words_every_ms = 5, heartbeat_every_ms = 10;
 constexpr std::uint8_t on_change = 255;
 
 std::vector<SdoStep> words_steps(const ServoDrive& drive) {
-  std::vector<SdoStep> steps{sdo_write({0x1017, 0}, 2, heartbeat_every_ms, "producer heartbeat time")};
+  std::vector<SdoStep> steps;
+  // A node that produces heartbeats doesn't guard its life (CiA 301).
+  if (drive.description().bring_up.stops_by != description::StopsBy::life_guarding) {
+    steps.push_back(sdo_write({0x1017, 0}, 2, heartbeat_every_ms, "producer heartbeat time"));
+  }
   const PdoConfiguration words{.direction = PdoDirection::transmit,
                                .number = words_pdo,
                                .id = pdo_id(PdoDirection::transmit, words_pdo, drive.node()),

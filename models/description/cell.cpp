@@ -249,7 +249,11 @@ BringUp read_bring_up(const YamlNode& node, const DriveDescription& drive) {
   b.answer_timeout_s = node.number_or("answer_timeout_s", b.answer_timeout_s, 0.02, 5.0);
   b.shows_mode_enabled = node.choice_or("mode_shown", "before", {"before", "enabled"}) == "enabled";
   if (b.shows_mode_enabled) require_mode_in_feedback(node, drive);
-  b.stops_by_setpoints = node.choice_or("stops_by", "heartbeat", {"heartbeat", "setpoint_timer"}) == "setpoint_timer";
+  const std::string stops_by =
+      node.choice_or("stops_by", "heartbeat", {"heartbeat", "setpoint_timer", "life_guarding"});
+  b.stops_by = stops_by == "heartbeat"        ? StopsBy::heartbeat
+               : stops_by == "setpoint_timer" ? StopsBy::setpoint_timer
+                                              : StopsBy::life_guarding;
   b.controlword_bits = static_cast<std::uint16_t>(node.integer_or("controlword_bits", 0, 0, 0xFFFF));
   if ((b.controlword_bits & ~free_controlword_bits) != 0) {
     throw node.error_at("controlword_bits", "bits 4 to 6, 9 and 11 to 15 (0xFA70): the others are the state machine's");

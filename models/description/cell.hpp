@@ -103,6 +103,13 @@ struct StartUpWrite {
   std::uint32_t value = 0;   // as the bytes are
 };
 
+// What stops a drive by itself when the controller is gone.
+enum class StopsBy : std::uint8_t {
+  heartbeat,       // 1016h: it misses the controller's heartbeat
+  setpoint_timer,  // 1400h:05 alone: it misses its setpoints
+  life_guarding,   // 100Ch, 100Dh: nobody asks for its state any more
+};
+
 // What a drive needs to come up besides what the profile has, as its manual or its stack wants it.
 struct BringUp {
   std::optional<double> enable_timeout_s;  // from where operation is wanted to where it takes targets; none: the
@@ -111,7 +118,7 @@ struct BringUp {
   double start_timeout_s = 2.0;     // until it first answers, and until a change of its NMT state shows
   double answer_timeout_s = 0.2;    // of each SDO request, which is sent three times
   bool shows_mode_enabled = false;  // 6061h shows the mode only once operation is enabled
-  bool stops_by_setpoints = false;  // has no 1016h: its setpoint timer (1400h:05) alone stops it without a controller
+  StopsBy stops_by = StopsBy::heartbeat;
   std::uint16_t controlword_bits = 0;  // set with `enable operation`, besides the mode's own
   std::vector<std::uint32_t> skip;     // optional objects that aren't touched, as index << 8 | sub-index
   std::vector<StartUpWrite> write;     // in this order

@@ -45,6 +45,8 @@ void CanopenSlave::add_communication_objects() {
   };
   od.add(0x1006, 0, unsigned32, read_write, 0);
   sync_window_ = &od.add(0x1007, 0, unsigned32, read_write, 0);
+  od.add(0x100C, 0, unsigned16, read_write, 0);
+  od.add(0x100D, 0, unsigned8, read_write, 0);
   od.add_text(0x1008, 0, config_.device_name);
   od.add_text(0x1009, 0, "simulated");
   od.add_text(0x100A, 0, "1.0");
@@ -96,7 +98,8 @@ void CanopenSlave::start_over(bool whole_device, std::int64_t time_ns) {
   heartbeat_period_ns_ = 0;
   sdo_.reset();
   errors_.clear();
-  last_sync_ns_ = never;
+  last_sync_ns_ = last_guard_ns_ = never;
+  life_lost_ = toggle_ = false;
   boot_ns_ = time_ns + config_.boot_time_ns;
   if (whole_device) application_.on_reset(time_ns);
 }
@@ -153,6 +156,8 @@ void CanopenSlave::send_state(NmtState state, std::int64_t time_ns) noexcept {
 // ---- Frames in
 
 void CanopenSlave::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
+  const bool is_guarded = frame.remote && !frame.extended && frame.id == 0x700u + config_.node;
+  if (is_guarded && state_ != NmtState::initialising) return on_guard_request(time_ns);
   if (frame.extended || frame.remote || frame.error || frame.length > (frame.fd ? 64 : 8)) return;
   if (frame.fd != (config_.fd && is_pdo(frame.id))) return;  // all services but PDOs stay with classic frames
   if (state_ == NmtState::initialising) return;
@@ -278,6 +283,7 @@ void CanopenSlave::on_time(std::int64_t time_ns) noexcept {
   }
   if (time_ns - last_sdo_ns_ > sdo_timeout) sdo_.reset();
   check_heartbeats(time_ns);
+  check_life_guarding(time_ns);
   const bool lazy = is_lazy(config_.stack);
   if (lazy && talks()) check_sync(time_ns);
   if (state_ != NmtState::operational) return;
@@ -294,6 +300,26 @@ void CanopenSlave::check_heartbeats(std::int64_t time_ns) {
     application_.on_communication_lost(emcy::heartbeat_lost, time_ns);
     error_behaviour(time_ns);
   }
+}
+
+// Node guarding isn't for a node that produces heartbeats (CiA 301).
+void CanopenSlave::on_guard_request(std::int64_t time_ns) noexcept {
+  if (heartbeat_period_ns_ > 0) return;
+  last_guard_ns_ = time_ns;
+  if (life_lost_ && !latches() && !insists()) clear_error(emcy::heartbeat_lost, time_ns);
+  life_lost_ = false;
+  toggle_ = !toggle_;
+  const auto byte = static_cast<std::uint8_t>(static_cast<unsigned>(state_) | (toggle_ ? 0U : 0x80U));
+  port_.send(make_frame(0x700u + config_.node, {&byte, 1}), time_ns);
+}
+
+void CanopenSlave::check_life_guarding(std::int64_t time_ns) {
+  const std::int64_t life_ns = dictionary_.number(0x100C) * dictionary_.number(0x100D) * millisecond;
+  if (life_ns == 0 || last_guard_ns_ == never || life_lost_ || time_ns - last_guard_ns_ <= life_ns) return;
+  life_lost_ = true;
+  raise_error(emcy::heartbeat_lost, error_register::communication, time_ns);
+  application_.on_communication_lost(emcy::heartbeat_lost, time_ns);
+  error_behaviour(time_ns);
 }
 
 // A lazy stack's: told, and nothing else.

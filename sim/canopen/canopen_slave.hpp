@@ -8,6 +8,7 @@
 //   080: (empty)                  SYNC (identifier from 1005h)
 //   080 + node: code u16, error register u8, 5 bytes of the maker's       EMCY
 //   580 + node, 600 + node        SDO answers and requests
+//   700 + node, remote request    node guarding: answered by the state, bit 7 toggling, while 1017h is 0
 //   700 + node: state             boot-up 00; heartbeat 04 stopped, 05 operational, 7F pre-operational
 #pragma once
 
@@ -146,6 +147,8 @@ class CanopenSlave final : public BusDevice {
   void on_receive_pdo(Receive& receive, const fieldbus::CanFrame& frame, std::int64_t time_ns);
   void on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
   void check_heartbeats(std::int64_t time_ns);
+  void on_guard_request(std::int64_t time_ns) noexcept;
+  void check_life_guarding(std::int64_t time_ns);
   void check_receive_pdos(std::int64_t time_ns, bool synchronous, bool others);
   void check_sync(std::int64_t time_ns);
   [[nodiscard]] bool latches() const noexcept { return config_.stack == StackBehaviour::latching; }
@@ -182,6 +185,8 @@ class CanopenSlave final : public BusDevice {
   std::int64_t heartbeat_period_ns_ = 0;
   std::int64_t last_sync_ns_ = never;
   std::int64_t last_sdo_ns_ = 0;
+  std::int64_t last_guard_ns_ = never;  // monitored once the first request has come
+  bool life_lost_ = false;
   SlaveQuirks quirks_;
   std::uint32_t syncs_ = 0;  // since power on
   bool toggle_ = false;      // of the next heartbeat

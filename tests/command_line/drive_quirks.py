@@ -55,6 +55,10 @@ def quirks():
     runs("no revision number", "lacks=0x101803")
     refused("no heartbeat consumer", "lacks=0x101601", words=("1016h:01", "06090011", "stops_by: setpoint_timer"))
     runs("no heartbeat consumer, as the cell says", "lacks=0x101601", cell=("bring_up: {stops_by: setpoint_timer}",))
+    runs("life guarding alone, as the cell says", "lacks=0x101601", "lacks=0x140005",
+         cell=("bring_up: {stops_by: life_guarding}",), arguments=("--timestep", "2ms"))
+    refused("no life guarding, though the cell says so", "lacks=0x101601", "lacks=0x100C00",
+            cell=("bring_up: {stops_by: life_guarding}",), words=("100Ch:00",), arguments=("--timestep", "2ms"))
     refused("nothing that would stop it", "lacks=0x101601", "lacks=0x140005",
             cell=("bring_up: {stops_by: setpoint_timer}",), words=("1400h:05",))
     refused("no heartbeat producer", "lacks=0x101700", words=("1017h:00",))
@@ -108,7 +112,8 @@ def quirks():
     runs("SDO answers 50 ms late", "sdo_late=50")
     runs("SDO answers 400 ms late, to the third request", "sdo_late=400")
     refused("SDO answers 700 ms late", "sdo_late=700", words=("node 1", "no answer"))
-    runs("SDO answers 700 ms late, as the cell says", "sdo_late=700", cell=("bring_up: {answer_timeout_s: 1}",))
+    runs("SDO answers 700 ms late, as the cell says", "sdo_late=700", cell=("bring_up: {answer_timeout_s: 1}",),
+         own_process_only="its set-up takes two minutes of any clock")
     runs("stray SDO answers", "sdo_stray")
     runs("SDO answers without a size", "sdo_sizeless")
     runs("SDO answers twice", "sdo_doubled")

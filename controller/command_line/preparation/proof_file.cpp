@@ -120,9 +120,9 @@ void require_proof(const PreparedSession& session) {
     refuse_proof(file, "a proof of another cell, or of this one before it, its URDF or its sensor's file was changed");
   if (!proof.whole) refuse_proof(file, "a proof of what drives do without the controller, and of nothing else");
   for (const description::DriveDescription& drive : session.cell.drives) {
-    if (drive.bring_up.stops_by_setpoints && proof.bus_loss.empty()) {
+    if (drive.bring_up.stops_by != description::StopsBy::heartbeat && proof.bus_loss.empty()) {
       refuse_proof(file, "a proof without --bus-loss, though the drive of " + drive.joint +
-                             " is stopped by its setpoint timer alone (bring_up: stops_by)");
+                             " isn't stopped by the heartbeat (bring_up: stops_by)");
     }
   }
 }

@@ -349,13 +349,32 @@ TEST_F(WithBringUp, WhatIsWrittenFirstComesBeforeTheMapping) {
 }
 
 TEST_F(WithBringUp, ADriveThatIsStoppedByItsSetpointTimerMustHaveIt) {
-  of_third.stops_by_setpoints = true;
+  of_third.stops_by = description::StopsBy::setpoint_timer;
   EXPECT_NO_THROW(bring_up());
   EXPECT_EQ(place_of({0x1016, 1}), -1);
   EXPECT_GE(place_of({0x1400, 5}), 0);
   three.aborts[{0x1400, 5}] = 0x06090011;
   forget_sent();
   has(refusal(), "object 1400h:05 RPDO event timer (timeout)");
+}
+
+// CiA 301, 7.2.8.3.2.1: life time = guard time (100Ch, ms) × factor (100Dh).
+TEST_F(WithBringUp, ADriveThatGuardsItsLifeIsToldForHowLong) {
+  three.objects.erase({0x1016, 1});
+  three.objects[{0x100C, 0}] = {2, 7};
+  three.objects[{0x100D, 0}] = {1, 0};
+  of_third.stops_by = description::StopsBy::life_guarding;
+  EXPECT_NO_THROW(bring_up());
+  EXPECT_EQ((three.objects[{0x100C, 0}].value), 20U);
+  EXPECT_EQ((three.objects[{0x100D, 0}].value), 3U);
+  CanFrame request;
+  ASSERT_TRUE(drives[2].guard_request(request));
+  EXPECT_EQ(request.id, 0x703U);
+  EXPECT_TRUE(request.remote);
+  EXPECT_FALSE(drives[0].guard_request(request));
+  three.objects.erase({0x100C, 0});
+  forget_sent();
+  has(refusal(), "object 100Ch:00 guard time (of the controller)");
 }
 
 // CiA 301: types 0 to 240 act at SYNC, 254 and 255 when the PDO comes.
