@@ -87,7 +87,7 @@ std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo) {
   if (pdo.event_timer_ms > 0) {
     steps.push_back(if_present(sdo_write({communication, 5}, 2, pdo.event_timer_ms,
                                          receive ? "RPDO event timer (timeout)" : "TPDO event timer"),
-                               "its RPDO timer doesn't stop it when the setpoints end; the heartbeat does"));
+                               "its RPDO timer doesn't stop it when the setpoints end; what else it watches does"));
   }
   steps.push_back(or_found(
       cob_id_step(pdo.direction, pdo.number, pdo.id, receive ? "RPDO COB-ID (enable)" : "TPDO COB-ID (enable)"),
