@@ -9,6 +9,7 @@
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sim_view.hpp"
 #include "fieldbus/can/socket_can_network.hpp"
+#include "fieldbus/canopen/bus_leader.hpp"
 #include "models/base/setup_error.hpp"
 #include "sim/cell/far_end_process.hpp"
 #include "sim/devices/modbus_server.hpp"
@@ -29,6 +30,20 @@ description::HandDescription hand_of(const PreparedSession& session, const RunOp
   description::HandDescription nobody;
   nobody.mass_kg = nobody.stiffness_N_per_m = nobody.damping_Ns_per_m = 0.0;
   return nobody;
+}
+
+// Two of one node would answer each other's requests.
+void require_nobody_plays(const description::Cell& cell, fieldbus::CanNetwork& network,
+                          const std::vector<std::size_t>& interface_of_bus) {
+  std::vector<fieldbus::BusToLead> buses;
+  for (std::size_t i = 0; i < cell.buses.size(); ++i) {
+    fieldbus::BusToLead bus{.bus = interface_of_bus[i]};
+    for (const description::DriveDescription& drive : cell.drives) {
+      if (drive.on_can() && drive.bus == cell.buses[i].name) bus.nodes.push_back(drive.node);
+    }
+    buses.push_back(std::move(bus));
+  }
+  fieldbus::require_nobody_plays(network, buses);
 }
 
 }  // namespace
@@ -55,6 +70,7 @@ int sim_command(const RunOptions& options) {
   std::vector<std::size_t> interface_of_bus;
   for (std::size_t i = 0; i < interfaces.size(); ++i) interface_of_bus.push_back(network.bus_of(i));
   sim::set_acceptance_filters(network, session.cell, session.sensor, interface_of_bus);
+  require_nobody_plays(session.cell, network, interface_of_bus);
   sim::SimulatedCellConfig config;
   config.faults = options.faults;
   config.enabling = options.enabling;

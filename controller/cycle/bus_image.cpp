@@ -110,7 +110,11 @@ void BusImage::send_setpoints(const Setpoints& setpoints, std::int64_t t_k_ns, s
     if (parts_.drives[i].drive.encode_rpdo(frame)) send(parts_.drives[i].bus, frame);
   }
   for (DriveBus& bus : parts_.drive_buses) {
-    if (bus.heartbeat.due(t_k_ns, cycle, frame)) send(bus.bus, frame);
+    if (!bus.heartbeat.due(t_k_ns, cycle, frame)) continue;
+    send(bus.bus, frame);
+    for (const fieldbus::DriveSlot& slot : parts_.can_drives) {
+      if (slot.bus == bus.bus && slot.drive->guard_request(frame)) send(bus.bus, frame);
+    }
   }
 }
 
@@ -182,7 +186,11 @@ void BusImage::send_last_words(std::int64_t t_ns) noexcept {
     if (slot.drive->encode_rpdo(frame)) (void)parts_.network.bus(slot.bus).send(frame);
   }
   for (DriveBus& bus : parts_.drive_buses) {
-    if (bus.heartbeat.due(t_ns, cycle_, frame)) (void)parts_.network.bus(bus.bus).send(frame);
+    if (!bus.heartbeat.due(t_ns, cycle_, frame)) continue;
+    (void)parts_.network.bus(bus.bus).send(frame);
+    for (const fieldbus::DriveSlot& slot : parts_.can_drives) {
+      if (slot.bus == bus.bus && slot.drive->guard_request(frame)) (void)parts_.network.bus(bus.bus).send(frame);
+    }
   }
   for (std::size_t bus = 0; goodbye_.next_request(t_ns, bus, frame);) (void)parts_.network.bus(bus).send(frame);
 }

@@ -14,7 +14,7 @@ std::array<double, models::max_axes> max_steps_rad(const std::vector<description
 OverdueDrive first_overdue(const std::vector<DriveOnBus>& drives, std::uint8_t following, double waited_s,
                            double usual_s) noexcept {
   for (std::size_t i = 0; i < drives.size(); ++i) {
-    const double limit_s = drives[i].drive.description().enable_timeout_s.value_or(usual_s);
+    const double limit_s = drives[i].drive.description().bring_up.enable_timeout_s.value_or(usual_s);
     if ((following >> i & 1U) == 0 && waited_s > limit_s) return {static_cast<int>(i), limit_s};
   }
   return {};

@@ -162,6 +162,14 @@ void BusLossSession::send_nmt(fieldbus::NmtCommand command) noexcept {
   }
 }
 
+void BusLossSession::ask_the_others() {
+  for (const fieldbus::DriveSlot& slot : parts_.can_drives) {
+    const fieldbus::DriveState told = slot.drive->state();
+    last_states_.push_back(fieldbus::is_switched_off(told) ? told
+                                                           : fieldbus::ask_for_states(parts_.network, {&slot, 1})[0]);
+  }
+}
+
 std::vector<OwnStop> BusLossSession::own_stops() const {
   std::vector<OwnStop> stops;
   if (silence_ns_ < 0 || !done()) return stops;
@@ -171,7 +179,7 @@ std::vector<OwnStop> BusLossSession::own_stops() const {
       return time_ns < 0 ? -1.0 : 1e-9 * static_cast<double>(time_ns - silence_ns_);
     };
     stops.push_back({parts_.can_drives[i].drive->description().joint, after(watch.reacted_ns()), after(watch.off_ns()),
-                     watch.signs(), fieldbus::is_switched_off(*parts_.can_drives[i].drive)});
+                     watch.signs(), i < last_states_.size() && fieldbus::is_switched_off(last_states_[i])});
   }
   return stops;
 }

@@ -49,6 +49,9 @@ class BusLossSession {
   [[nodiscard]] bool done() const noexcept { return step_ == Step::done; }
   // Whether nothing is to be sent; a late cycle doesn't matter then.
   [[nodiscard]] bool silent() const noexcept { return step_ == Step::silent; }
+  // Precondition: done(). Asks each drive by SDO that hasn't said that it is off: one that refuses NMT start after the
+  // silence, as a stack does that holds an error, sends no TPDO any more. Blocks; not for the cycle.
+  void ask_the_others();
   void shut_down() noexcept { bus_.shut_down(controller::ns_of(settings_.period_s)); }
   void request_stop() noexcept { stop_.store(true); }  // any thread
   // Whether the enabling switch has to be released and pressed.
@@ -87,6 +90,7 @@ class BusLossSession {
   NoListener listener_;
   controller::Setpoints setpoints_;
   std::vector<fieldbus::SilenceWatch> watches_;
+  std::vector<fieldbus::DriveState> last_states_;  // of the drives on CAN, once they have been asked
   Step step_ = Step::waiting;
   std::int64_t since_ns_ = 0, last_word_ns_ = -1;
   bool heartbeat_was_last_ = false;  // the last cycle sent a heartbeat

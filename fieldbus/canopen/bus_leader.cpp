@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "fieldbus/canopen/canopen_emcy.hpp"
 #include "fieldbus/canopen/canopen_heartbeat.hpp"
 #include "fieldbus/canopen/canopen_object.hpp"
 #include "fieldbus/canopen/canopen_pdo.hpp"
@@ -11,8 +12,8 @@
 namespace proxarm::fieldbus {
 namespace {
 
-constexpr std::uint32_t nmt_id = 0x000, sdo_request_base = 0x600;
-constexpr std::uint8_t receive_pdos = 4;
+constexpr std::uint32_t nmt_id = 0x000, sdo_answer_base = 0x580, sdo_request_base = 0x600;
+constexpr std::uint8_t pdos = 4;
 
 const char* name_of(std::uint32_t id) noexcept {
   if (id == nmt_id) return "NMT commands";
@@ -21,15 +22,33 @@ const char* name_of(std::uint32_t id) noexcept {
   return id > sdo_request_base ? "SDO requests" : "setpoints";
 }
 
+const char* name_of_nodes(std::uint32_t id) noexcept {
+  if (id > heartbeat_id(0)) return "heartbeats";
+  if (id < pdo_id(PdoDirection::transmit, 1, 0)) return "EMCYs";
+  return id > sdo_answer_base ? "SDO answers" : "PDOs";
+}
+
+std::vector<std::uint32_t> ids_of_nodes(const std::vector<std::uint8_t>& nodes) {
+  std::vector<std::uint32_t> ids;
+  for (const std::uint8_t node : nodes) {
+    for (std::uint8_t number = 1; number <= pdos; ++number) {
+      ids.push_back(pdo_id(PdoDirection::transmit, number, node));
+    }
+    ids.insert(ids.end(), {emcy_id(node), sdo_answer_base + node, heartbeat_id(node)});
+  }
+  return ids;
+}
+
 }  // namespace
 
-LeaderWatch::LeaderWatch(BusToLead bus) : bus_(std::move(bus)) {}
+LeaderWatch::LeaderWatch(BusToLead bus, Listening listening) : bus_(std::move(bus)), listening_(listening) {}
 
 std::vector<std::uint32_t> LeaderWatch::wanted_ids() const {
+  if (listening_ == Listening::for_nodes) return ids_of_nodes(bus_.nodes);
   std::vector<std::uint32_t> ids{nmt_id, sync_id};
   if (bus_.master_node != 0) ids.push_back(heartbeat_id(bus_.master_node));
   for (const std::uint8_t node : bus_.nodes) {
-    for (std::uint8_t number = 1; number <= receive_pdos; ++number) {
+    for (std::uint8_t number = 1; number <= pdos; ++number) {
       ids.push_back(pdo_id(PdoDirection::receive, number, node));
     }
     ids.push_back(sdo_request_base + node);
@@ -46,16 +65,20 @@ void LeaderWatch::on_frame(const CanFrame& frame) {
 std::string LeaderWatch::signs() const {
   std::string text;
   for (const auto& [id, count] : counts_) {
-    text += (text.empty() ? "" : "; ") + std::string(name_of(id)) + " (" + hex_text(id, 3) + ")";
+    const char* name = listening_ == Listening::for_nodes ? name_of_nodes(id) : name_of(id);
+    text += (text.empty() ? "" : "; ") + std::string(name) + " (" + hex_text(id, 3) + ")";
     text += ", " + std::to_string(count) + (count == 1 ? " time" : " times");
   }
   return text;
 }
 
-void require_nobody_leads(CanNetwork& network, std::span<const BusToLead> buses, std::int64_t time_ns,
-                          const FrameHandler& other) {
+namespace {
+
+// Listens for all of the time; a watch for each bus.
+std::vector<LeaderWatch> listen(CanNetwork& network, std::span<const BusToLead> buses, Listening listening,
+                                std::int64_t time_ns, const FrameHandler& other) {
   std::vector<LeaderWatch> watches;
-  for (const BusToLead& bus : buses) watches.emplace_back(bus);
+  for (const BusToLead& bus : buses) watches.emplace_back(bus, listening);
   const FrameHandler on_frame = [&](std::size_t from, const TimedFrame& received) {
     for (std::size_t i = 0; i < buses.size(); ++i) {
       if (buses[i].bus == from) watches[i].on_frame(received.frame);
@@ -64,6 +87,14 @@ void require_nobody_leads(CanNetwork& network, std::span<const BusToLead> buses,
   };
   const std::int64_t until_ns = network.now_ns() + time_ns;
   pump_frames(network, until_ns, on_frame, [until_ns](std::int64_t) { return until_ns; });
+  return watches;
+}
+
+}  // namespace
+
+void require_nobody_leads(CanNetwork& network, std::span<const BusToLead> buses, std::int64_t time_ns,
+                          const FrameHandler& other) {
+  const std::vector<LeaderWatch> watches = listen(network, buses, Listening::for_leader, time_ns, other);
   for (std::size_t i = 0; i < buses.size(); ++i) {
     if (!watches[i].seen()) continue;
     throw description::SetupError(
@@ -72,6 +103,20 @@ void require_nobody_leads(CanNetwork& network, std::span<const BusToLead> buses,
          .found = watches[i].signs(),
          .expected = "a bus that nobody leads",
          .advice = "end the other session or master first: two would disturb each other's drives"});
+  }
+}
+
+void require_nobody_plays(CanNetwork& network, std::span<const BusToLead> buses, std::int64_t time_ns) {
+  const std::vector<LeaderWatch> watches = listen(network, buses, Listening::for_nodes, time_ns, {});
+  for (std::size_t i = 0; i < buses.size(); ++i) {
+    if (!watches[i].seen()) continue;
+    throw description::SetupError(
+        {.bus = network.bus(buses[i].bus).name(),
+         .message = "a drive of this cell is on this bus already, and nothing was sent",
+         .found = watches[i].signs(),
+         .expected = "a bus without the nodes that are to be simulated",
+         .advice = "end the other `proxarm sim`, or take the real drives off: two of one node answer each other's "
+                   "requests"});
   }
 }
 

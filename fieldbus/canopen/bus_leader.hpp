@@ -20,6 +20,12 @@ namespace proxarm::fieldbus {
 // Longer than the longest SYNC period (255 ms) and than a controller's longest silence at its set-up.
 inline constexpr std::int64_t listen_before_speaking_ns = 300'000'000;
 
+// What to listen for on a bus.
+enum class Listening : std::uint8_t {
+  for_leader,  // SYNC, NMT, the controller's heartbeat; setpoints and SDO requests for the nodes
+  for_nodes,   // what the nodes themselves send: PDOs, EMCYs, SDO answers, heartbeats
+};
+
 // What to listen to on one bus of the network.
 struct BusToLead {
   std::size_t bus = 0;
@@ -27,10 +33,10 @@ struct BusToLead {
   std::uint8_t master_node = 0;       // whose heartbeat would be somebody else's; 0: not looked at
 };
 
-// The signs of a leader on one bus.
+// The signs of a leader, or of nodes, on one bus.
 class LeaderWatch {
  public:
-  explicit LeaderWatch(BusToLead bus);
+  explicit LeaderWatch(BusToLead bus, Listening listening = Listening::for_leader);
 
   // For the kernel's filters.
   [[nodiscard]] std::vector<std::uint32_t> wanted_ids() const;
@@ -41,6 +47,7 @@ class LeaderWatch {
 
  private:
   BusToLead bus_;
+  Listening listening_;
   std::map<std::uint32_t, std::uint64_t> counts_;  // by identifier
 };
 
@@ -48,5 +55,9 @@ class LeaderWatch {
 // frame goes to `other`, too.
 void require_nobody_leads(CanNetwork& network, std::span<const BusToLead> buses,
                           std::int64_t time_ns = listen_before_speaking_ns, const FrameHandler& other = {});
+// The same for who is about to play the nodes of a bus: throws where one of them speaks already. A node that has
+// nothing to say in that time isn't heard.
+void require_nobody_plays(CanNetwork& network, std::span<const BusToLead> buses,
+                          std::int64_t time_ns = listen_before_speaking_ns);
 
 }  // namespace proxarm::fieldbus

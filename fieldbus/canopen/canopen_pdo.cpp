@@ -52,7 +52,8 @@ std::uint32_t mapping_entry(const MappedObject& mapped) noexcept {
 }
 
 // Where a drive's mapping is its maker's, it is taken if it is what is wanted. A transmit PDO may carry more behind
-// that, which nobody reads; a receive PDO that is synchronous but not cyclic (type 0) acts at the same SYNC.
+// that, which nobody reads; a receive PDO that is synchronous but not cyclic (type 0) acts at the same SYNC, one that
+// isn't synchronous (254, 255) as soon as it comes.
 std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo) {
   check(pdo);
   const bool receive = pdo.direction == PdoDirection::receive;
@@ -75,14 +76,18 @@ std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo) {
   }
   steps.push_back(
       or_found(sdo_write({mapping, 0}, 1, sub, receive ? "RPDO mapping (objects)" : "TPDO mapping (objects)"), counts));
-  steps.push_back(or_found(sdo_write({communication, 2}, 1, pdo.transmission_type,
-                                     receive ? "RPDO transmission type" : "TPDO transmission type"),
-                           receive ? std::vector<std::uint32_t>{pdo.transmission_type, 0}
-                                   : std::vector<std::uint32_t>{pdo.transmission_type}));
+  SdoStep type = sdo_write({communication, 2}, 1, pdo.transmission_type,
+                           receive ? "RPDO transmission type" : "TPDO transmission type");
+  type.as_found = {pdo.transmission_type};
+  if (receive) {
+    type.as_found.insert(type.as_found.end(), {0, 254, 255});
+    type.lost = "where this is 254 or 255, what it is sent acts as soon as it comes, and not at SYNC";
+  }
+  steps.push_back(type);
   if (pdo.event_timer_ms > 0) {
     steps.push_back(if_present(sdo_write({communication, 5}, 2, pdo.event_timer_ms,
                                          receive ? "RPDO event timer (timeout)" : "TPDO event timer"),
-                               "its RPDO timer doesn't stop it when the setpoints end; the heartbeat does"));
+                               "its RPDO timer doesn't stop it when the setpoints end; what else it watches does"));
   }
   steps.push_back(or_found(
       cob_id_step(pdo.direction, pdo.number, pdo.id, receive ? "RPDO COB-ID (enable)" : "TPDO COB-ID (enable)"),

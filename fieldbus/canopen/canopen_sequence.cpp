@@ -182,7 +182,9 @@ void SdoSequence::take_as_found(std::uint32_t value, std::int64_t now_ns) {
     }
     const std::uint32_t shown_mask = step.mask & size_mask(step.bytes);
     if (shown_mask != size_mask(step.bytes)) expected += " in the bits " + hex_text(shown_mask, 2 * step.bytes);
-    fail(value_text(value, step.bytes) + (couldnt_write ? ", which can't be written" : ""), std::move(expected),
+    fail(value_text(value, step.bytes) +
+             (couldnt_write ? ", which can't be written (" + describe_sdo_abort(refusal_) + ")" : ""),
+         std::move(expected),
          couldnt_write ? "set it by the maker's tool, if that can"
                        : "the drive took the value without an error but kept another; is it limited or locked by the "
                          "maker's tool?");
@@ -214,13 +216,14 @@ SdoSequence::Refused SdoSequence::refused_by(std::uint32_t code) const noexcept 
   constexpr std::uint32_t by_object[] = {sdo_abort::unsupported_access, sdo_abort::write_of_read_only,
                                          sdo_abort::not_transferable, sdo_abort::local_control,
                                          sdo_abort::device_state};
-  constexpr std::uint32_t by_value[] = {sdo_abort::invalid_value, sdo_abort::value_too_high, sdo_abort::value_too_low};
+  constexpr std::uint32_t by_value[] = {sdo_abort::invalid_value, sdo_abort::value_too_high, sdo_abort::value_too_low,
+                                        sdo_abort::general_error};
   const auto is_in = [code](const auto& codes) {
     return std::find(std::begin(codes), std::end(codes), code) != std::end(codes);
   };
   const SdoStep& step = steps_[next_];
-  if (is_in(by_object) && (step.is_optional || !step.as_found.empty())) return Refused::object;
-  return is_in(by_value) && step.is_optional ? Refused::value : Refused::no;
+  if (!step.is_optional && step.as_found.empty()) return Refused::no;
+  return is_in(by_object) ? Refused::object : is_in(by_value) ? Refused::value : Refused::no;
 }
 
 bool SdoSequence::looks_at_what_is_there(std::uint32_t code, std::int64_t now_ns) {

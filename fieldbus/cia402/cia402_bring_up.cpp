@@ -104,19 +104,13 @@ std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const Fr
 }
 
 void require_pre_operational(CanNetwork& network, Slots drives, const FrameHandler& handler) {
-  std::int64_t timeout_ns = 0;
-  for (const DriveSlot& slot : drives) timeout_ns = std::max(timeout_ns, slot.drive->settings().nmt_timeout_ns);
+  const std::int64_t timeout_ns = longest_nmt_timeout_ns(drives);
   if (wait_for_state(network, drives, handler, NmtState::pre_operational, timeout_ns)) return;
-  const ServoDrive& drive = *std::find_if_not(drives.begin(), drives.end(), [](const DriveSlot& slot) {
-                               return slot.drive->nmt_state() == NmtState::pre_operational;
-                             })->drive;
-  throw SetupError(
-      {.bus = drive.description().bus,
-       .node = drive.node(),
-       .message = "drive of " + drive.description().joint + ", NMT state in its heartbeat",
-       .found = std::string(to_string(drive.nmt_state())),
-       .expected = std::string(to_string(NmtState::pre_operational)),
-       .advice = "it took its configuration but doesn't stay in pre-operational: is another master on the bus?"});
+  const auto other = std::find_if_not(drives.begin(), drives.end(), [](const DriveSlot& slot) {
+    return slot.drive->nmt_state() == NmtState::pre_operational;
+  });
+  throw not_in_state(*other->drive, NmtState::pre_operational, "",
+                     "it took its configuration but doesn't stay in pre-operational: is another master on the bus?");
 }
 
 }  // namespace
@@ -155,12 +149,7 @@ std::vector<std::string> losses_of(Slots drives) {
 std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, Slots drives, const FrameHandler& other,
                                            const Tell& tell) {
   refuse_shared_nodes(drives);
-  const FrameHandler handler = [&](std::size_t bus, const TimedFrame& received) {
-    for (const DriveSlot& slot : drives) {
-      if (slot.bus == bus && slot.drive->on_frame(received.frame, received.time_ns)) return;
-    }
-    if (other) other(bus, received);
-  };
+  const FrameHandler handler = handed_to(drives, other);
   const auto configure_all = [&](Slots some) {
     auto identities =
         configure(network, some, handler, [](const ServoDrive& drive) { return drive.configuration_steps(); });
@@ -176,8 +165,8 @@ std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, Slots drives, co
   return identities;
 }
 
-bool is_switched_off(const ServoDrive& drive) noexcept {
-  switch (drive.state()) {
+bool is_switched_off(DriveState state) noexcept {
+  switch (state) {
     case DriveState::switch_on_disabled:
     case DriveState::ready_to_switch_on:
     case DriveState::fault:

@@ -52,7 +52,7 @@ using Tell = std::function<void(const std::string&)>;
 std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, std::span<const DriveSlot> drives,
                                            const FrameHandler& other = {}, const Tell& tell = {});
 
-// Whether its last word was that it has no power; it then needs nobody to watch over it.
-[[nodiscard]] bool is_switched_off(const ServoDrive& drive) noexcept;
+// Whether a drive in this state has no power; it then needs nobody to watch over it.
+[[nodiscard]] bool is_switched_off(DriveState state) noexcept;
 
 }  // namespace proxarm::fieldbus

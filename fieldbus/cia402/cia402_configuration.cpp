@@ -23,8 +23,17 @@ constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h w
 constexpr const char* period_advice =
     "take a period of one to three digits of microseconds or milliseconds, such as 0.5ms, 1ms, 2ms, 4ms";
 
-const DriveSettings& checked(const DriveSettings& settings) {
+// The session's, with the times that this drive needs.
+DriveSettings settings_of(const description::DriveDescription& drive, DriveSettings settings) {
   settings.validate();
+  const auto to_ns = [](double seconds) { return std::llround(1e9 * seconds); };
+  const description::BringUp usual;
+  if (drive.bring_up.start_timeout_s != usual.start_timeout_s) {
+    settings.nmt_timeout_ns = settings.sdo.first_answer_ns = to_ns(drive.bring_up.start_timeout_s);
+  }
+  if (drive.bring_up.answer_timeout_s != usual.answer_timeout_s) {
+    settings.sdo.client.timeout_ns = to_ns(drive.bring_up.answer_timeout_s);
+  }
   return settings;
 }
 
@@ -46,6 +55,11 @@ std::uint16_t rpdo_timeout_ms(const DriveSettings& settings, std::int64_t period
 }
 
 std::uint32_t as_u8(std::int8_t value) noexcept { return static_cast<std::uint8_t>(value); }
+
+bool is_skipped(const description::BringUp& bring_up, const SdoStep& step) noexcept {
+  return std::any_of(bring_up.skip.begin(), bring_up.skip.end(),
+                     [&](std::uint32_t object) { return step.object == object_address(object); });
+}
 
 void append(std::vector<SdoStep>& steps, const std::vector<SdoStep>& more) {
   steps.insert(steps.end(), more.begin(), more.end());
@@ -82,7 +96,8 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .fd = drive.fd,
                            .mapping = rpdo_mapping(drive)}));
   // The last torque acts until this timer runs out: a drive without it would go on for as long as the heartbeat lasts.
-  if (mode_of(drive).torque) {
+  // It is all that stops a drive which doesn't watch the heartbeat.
+  if (mode_of(drive).torque || drive.bring_up.stops_by == description::StopsBy::setpoint_timer) {
     for (SdoStep& step : steps) {
       if (step.object == ObjectAddress{0x1400, 5}) step.is_optional = false;
     }
@@ -117,13 +132,42 @@ void append_torque(std::vector<SdoStep>& steps, const description::DriveDescript
   steps.push_back(if_present(sdo_write({0x6080, 0}, 4, static_cast<std::uint32_t>(std::ceil(rpm)), "max motor speed")));
 }
 
+// By which the drive watches the controller. Off first: one that still watches for the last session's controller would
+// trip in the middle of this set-up.
+void append_heartbeat(std::vector<SdoStep>& steps, std::uint32_t consumer) {
+  for (const std::uint32_t value : {0U, consumer}) {
+    SdoStep step = sdo_write({0x1016, 1}, 4, value, "consumer heartbeat time (of the controller)");
+    step.advice =
+        "by this the drive stops when the controller is gone; where life guarding (100Ch) or its setpoint timer "
+        "(1400h:05) does, say bring_up: {stops_by: life_guarding} or {stops_by: setpoint_timer} at the drive in the "
+        "cell, and try it: proxarm prove --bus-loss";
+    steps.push_back(step);
+  }
+}
+
+// The same by life guarding (CiA 301): the drive stops when nobody has asked for its state for guard time × factor.
+void append_life_guarding(std::vector<SdoStep>& steps, const DriveSettings& settings) {
+  for (const std::uint32_t time_ms : {0U, std::uint32_t{settings.master_heartbeat_ms}}) {
+    steps.push_back(sdo_write({0x100C, 0}, 2, time_ms, "guard time (of the controller)"));
+  }
+  steps.push_back(sdo_write({0x100D, 0}, 1, settings.life_time_factor(), "life time factor"));
+}
+
+// What is written before the PDOs are mapped, because the drive wants it so.
+void append_start_up(std::vector<SdoStep>& steps, const description::BringUp& bring_up) {
+  for (const description::StartUpWrite& write : bring_up.write) {
+    steps.push_back(sdo_write(object_address(write.object), static_cast<std::uint8_t>(write.bits / 8), write.value,
+                              "start-up value (bring_up)"));
+  }
+}
+
 // What the drive does when we are gone or when it is told to stop. 1016h is a must, since it is what stops the arm when
-// the controller dies; the others have defaults in the standard that stop it too.
-void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings) {
-  const std::uint32_t consumer = settings.consumer_heartbeat();
-  // Off first: a drive that still watches for the last session's controller would trip in the middle of this set-up.
-  steps.push_back(sdo_write({0x1016, 1}, 4, 0, "consumer heartbeat time (of the controller)"));
-  steps.push_back(sdo_write({0x1016, 1}, 4, consumer, "consumer heartbeat time (of the controller)"));
+// the controller dies, unless the cell says what else does; the others have defaults in the standard that
+// stop it too.
+void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings,
+                      const description::BringUp& bring_up) {
+  if (bring_up.stops_by == description::StopsBy::heartbeat) append_heartbeat(steps, settings.consumer_heartbeat());
+  if (bring_up.stops_by == description::StopsBy::life_guarding) append_life_guarding(steps, settings);
   steps.push_back(sdo_write({0x1017, 0}, 2, settings.drive_heartbeat_ms, "producer heartbeat time"));
   steps.push_back(if_present(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));
   // Where it is the maker's: a fault or no voltage stops the arm, too. 0, no action, is refused.
@@ -203,7 +247,7 @@ void DriveSettings::validate() const {
 
 ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSettings& settings)
     : description_(drive),
-      settings_(checked(settings)),
+      settings_(settings_of(drive, settings)),
       mode_(mode_of(drive)),
       tpdo_bytes_(pdo_bytes(tpdo_mapping(drive))),
       rpdo_bytes_(pdo_bytes(rpdo_mapping(drive))),
@@ -223,6 +267,7 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
     refuse(drive, "following_error_window_rad", number_text(settings.following_error_window_rad),
            "a window whose counts fit 32 bits");
   }
+  note_skipped();
   if (drive.eds.empty()) return;
   eds_ = std::make_shared<description::EdsFile>(description::load_eds(drive.eds));
   if (!description_.device_type) description_.device_type = cia402_device_type(*eds_);
@@ -306,6 +351,29 @@ std::vector<SdoStep> ServoDrive::configuration_steps() const {
 }
 
 std::vector<SdoStep> ServoDrive::profile_steps() const {
+  std::vector<SdoStep> steps = all_profile_steps();
+  std::erase_if(steps, [this](const SdoStep& step) { return is_skipped(description_.bring_up, step); });
+  return steps;
+}
+
+// What is skipped must be what a drive may do without.
+void ServoDrive::note_skipped() {
+  const std::vector<SdoStep> steps = all_profile_steps();
+  for (const std::uint32_t object : description_.bring_up.skip) {
+    const auto step = std::find_if(steps.begin(), steps.end(),
+                                   [object](const SdoStep& s) { return s.object == object_address(object); });
+    const std::string name = to_string(object_address(object));
+    if (step == steps.end() || !step->is_optional) {
+      refuse(description_, "bring_up: skip",
+             name + (step == steps.end() ? ", which isn't touched" : ", which is a must"),
+             "an optional object of the set-up, such as 1029h:01 or 605Ah");
+    }
+    losses_.push_back(name + " isn't touched (bring_up: skip): " +
+                      (*step->lost != '\0' ? step->lost : "the drive has its own " + std::string(step->name)));
+  }
+}
+
+std::vector<SdoStep> ServoDrive::all_profile_steps() const {
   const auto period = *interpolation_period(settings_.period_ns);
   std::vector<SdoStep> steps;
   append_identity(steps, description_);
@@ -317,6 +385,7 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
     homed.is_state = true;
     steps.push_back(homed);
   }
+  append_start_up(steps, description_.bring_up);
   append_pdos(steps, description_, rpdo_timeout_ms(settings_, settings_.period_ns, mode_.torque),
               settings_.inputs_object, torque_feedback_);
   // A drive may have one of both for good: it fits where it is what this period needs.
@@ -328,7 +397,7 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
                            {as_u8(period.exponent)}));
   steps.push_back(
       if_present(sdo_write({0x1006, 0}, 4, *sync_period_us(settings_.period_ns), "communication cycle period")));
-  append_reactions(steps, settings_);
+  append_reactions(steps, settings_, description_.bring_up);
   // Ramps of the stops above, in counts/s² (the profile's default unit).
   if (const auto ramp = scale_.size_counts(description_.max_acceleration_rad_per_s2); ramp && *ramp > 0) {
     steps.push_back(if_present(sdo_write({0x6084, 0}, 4, *ramp, "profile deceleration")));
@@ -339,8 +408,9 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
       "it has no such window of its own, so only the controller watches whether it follows"));
   steps.push_back(if_present(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
   if (mode_.torque) append_torque(steps, description_);
-  steps.push_back(sdo_write(object_address(description_.objects.mode), 1, mode_.number, "modes of operation"));
-  if (description_.shows_mode_enabled) return steps;  // the cycle looks at it, in TPDO1
+  steps.push_back(or_found(sdo_write(object_address(description_.objects.mode), 1, mode_.number, "modes of operation"),
+                           {mode_.number}));
+  if (description_.bring_up.shows_mode_enabled) return steps;  // the cycle looks at it, in TPDO1
   SdoStep display = sdo_expect(object_address(description_.objects.mode_display), 1, mode_.number,
                                "modes of operation display", mode_.not_taken);
   display.is_state = true;
@@ -378,7 +448,7 @@ std::string ServoDrive::stuck_text() const {
   }
   return text +
          "it is enabled, but never says that it follows its targets (bit 12 of the statusword); a slow brake wants "
-         "`enable_timeout_s` in the cell";
+         "`bring_up: {enable_timeout_s: ...}` in the cell";
 }
 
 std::string ServoDrive::describe() const {

@@ -42,7 +42,7 @@ void ServoDrive::raise(DriveFault fault) noexcept {
 
 void ServoDrive::request(DriveGoal goal) noexcept {
   const bool wanted = goal_ == DriveGoal::operation_enabled, wants = goal == DriveGoal::operation_enabled;
-  if (wanted && !wants && heard_ && !following_) stuck_ = 1U << 16 | statusword_;
+  if (wanted && !wants && heard_ && !following_ && fault_ == DriveFault::none) stuck_ = 1U << 16 | statusword_;
   if (wants) stuck_ = 0;
   goal_ = goal;
 }
@@ -156,6 +156,15 @@ bool ServoDrive::set_target_torque_Nm(double torque_Nm) noexcept {
   return true;
 }
 
+bool ServoDrive::guard_request(CanFrame& frame) const noexcept {
+  if (description_.bring_up.stops_by != description::StopsBy::life_guarding) return false;
+  frame = CanFrame{};
+  frame.id = heartbeat_id(node());
+  frame.remote = true;
+  frame.length = 1;  // of the answer
+  return true;
+}
+
 bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
   if (!heard_) return false;
   if (!following_) target_counts_ = actual_counts_;
@@ -169,9 +178,9 @@ bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
   frame.id = pdo_id(PdoDirection::receive, 1, node());
   frame.fd = frame.bit_rate_switch = description_.fd;
   frame.length = rpdo_bytes_;  // 4 or 6: a length that CAN FD has as well
-  // Interpolated position: bit 4 says that its targets are valid; cyclic synchronous position has no such bit.
-  const bool interpolates = description_.mode == "ip" && controlword_ == controlword::enable_operation;
-  write_u16_le(&frame.data[0], static_cast<std::uint16_t>(controlword_ | (interpolates ? 0x0010U : 0U)));
+  const unsigned bits = mode_.controlword_bits | description_.bring_up.controlword_bits;
+  const bool enables = controlword_ == controlword::enable_operation;
+  write_u16_le(&frame.data[0], static_cast<std::uint16_t>(controlword_ | (enables ? bits : 0U)));
   if (mode_.torque) {
     write_u16_le(&frame.data[2], static_cast<std::uint16_t>(target_torque_));
   } else {

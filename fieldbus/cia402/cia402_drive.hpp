@@ -10,6 +10,7 @@
 // drive applies it once its brake is open, and the axis falls where it isn't what holds it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -58,6 +59,10 @@ struct DriveSettings {
   // 1016h:01, by which a drive watches the controller.
   [[nodiscard]] std::uint32_t consumer_heartbeat() const noexcept {
     return static_cast<std::uint32_t>(master_node) << 16 | master_heartbeat_timeout_ms;
+  }
+  // 100Dh, of a drive that watches the controller by life guarding; 100Ch is the heartbeat's period.
+  [[nodiscard]] std::uint8_t life_time_factor() const noexcept {
+    return static_cast<std::uint8_t>(std::clamp(master_heartbeat_timeout_ms / master_heartbeat_ms, 1, 255));
   }
   void validate() const;  // throws SetupError
 };
@@ -116,6 +121,10 @@ class ServoDrive final : public CyclicDrive {
   // The RPDO of this cycle; false while no position is known yet, and then nothing may be sent.
   bool encode_rpdo(CanFrame& frame) noexcept override;
 
+  // Asks for its NMT state: a drive that watches the controller by life guarding wants that as often as a heartbeat
+  // comes. False: it doesn't.
+  [[nodiscard]] bool guard_request(CanFrame& frame) const noexcept;
+
   // ---- what is known of the drive ----
   [[nodiscard]] bool fresh() const noexcept override { return fresh_; }  // a TPDO came since the last SYNC
   [[nodiscard]] bool heard() const noexcept { return heard_; }           // a TPDO came ever
@@ -168,7 +177,9 @@ class ServoDrive final : public CyclicDrive {
   void set_up_torque();
   void lose_feedback(const MappedObject& object);
   void leave_out_what_eds_lacks();
-  [[nodiscard]] std::vector<SdoStep> profile_steps() const;
+  [[nodiscard]] std::vector<SdoStep> all_profile_steps() const;
+  [[nodiscard]] std::vector<SdoStep> profile_steps() const;  // without those that the cell has it skip
+  void note_skipped();
   bool decode_tpdo(const CanFrame& frame) noexcept;
   void judge_doubled() noexcept;
   [[nodiscard]] bool shows_mode() const noexcept { return !mode_byte_ || shown_mode_ == mode_.number; }

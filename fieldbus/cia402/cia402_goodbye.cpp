@@ -1,7 +1,6 @@
 #include "fieldbus/cia402/cia402_goodbye.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "fieldbus/can/byte_order.hpp"
 #include "fieldbus/canopen/canopen_nmt.hpp"
@@ -10,8 +9,18 @@
 namespace proxarm::fieldbus {
 namespace {
 
-// In the order in which they are written: a missing heartbeat trips more drives than a missing SYNC.
-constexpr std::array<ObjectAddress, 2> watched_by_the_drive = {{{0x1016, 1}, {0x1006, 0}}};
+struct Watched {
+  ObjectAddress object;
+  std::uint8_t bytes;
+};
+constexpr std::uint8_t watched_objects = 2;
+
+// In the order in which they are written: a missing controller trips more drives than a missing SYNC.
+Watched watched_by(const ServoDrive& drive, std::uint8_t step) noexcept {
+  if (step > 0) return {{0x1006, 0}, 4};
+  const bool guards = drive.description().bring_up.stops_by == description::StopsBy::life_guarding;
+  return guards ? Watched{{0x100C, 0}, 2} : Watched{{0x1016, 1}, 4};
+}
 
 constexpr std::int64_t ms = 1'000'000;
 // Most drives need two periods from ready to switch on (no power) to switch on disabled; one that stays is told then.
@@ -32,7 +41,7 @@ void Goodbye::begin(std::int64_t now_ns) noexcept {
 
 bool Goodbye::is_off(const ServoDrive& drive, std::int64_t now_ns) const noexcept {
   if (drive.state() == DriveState::ready_to_switch_on) return now_ns - begun_ns_ >= patience_ns;
-  return is_switched_off(drive);
+  return is_switched_off(drive.state());
 }
 
 bool Goodbye::is_busy(std::size_t bus) const noexcept {
@@ -50,9 +59,10 @@ bool Goodbye::next_request(std::int64_t now_ns, std::size_t& bus, CanFrame& fram
       ++node.step;
     }
     const ServoDrive& drive = *drives_[i].drive;
-    if (node.step >= watched_by_the_drive.size() || is_busy(drives_[i].bus) || !is_off(drive, now_ns)) continue;
+    if (node.step >= watched_objects || is_busy(drives_[i].bus) || !is_off(drive, now_ns)) continue;
     bus = drives_[i].bus;
-    frame = expedited_download(drive.node(), watched_by_the_drive[node.step], 4, 0);
+    const Watched watched = watched_by(drive, node.step);
+    frame = expedited_download(drive.node(), watched.object, watched.bytes, 0);
     node.waiting = true;
     node.deadline_ns = now_ns + answer_timeout_ns;
     return true;
@@ -66,7 +76,7 @@ bool Goodbye::on_frame(std::size_t bus, const CanFrame& frame) noexcept {
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     if (drives_[i].bus != bus || frame.id != SdoClient::answer_id(drives_[i].drive->node())) continue;
     Node& node = nodes_[i];
-    if (node.waiting && frame.length == 8 && names_object(frame, watched_by_the_drive[node.step])) {
+    if (node.waiting && frame.length == 8 && names_object(frame, watched_by(*drives_[i].drive, node.step).object)) {
       node.waiting = false;
       ++node.step;
     }
@@ -76,9 +86,8 @@ bool Goodbye::on_frame(std::size_t bus, const CanFrame& frame) noexcept {
 }
 
 bool Goodbye::done(std::int64_t now_ns) const noexcept {
-  return now_ns - begun_ns_ >= limit_ns || std::all_of(nodes_.begin(), nodes_.end(), [](const Node& node) {
-           return node.step >= watched_by_the_drive.size();
-         });
+  return now_ns - begun_ns_ >= limit_ns ||
+         std::all_of(nodes_.begin(), nodes_.end(), [](const Node& node) { return node.step >= watched_objects; });
 }
 
 void leave_operational(CanNetwork& network, std::span<const DriveSlot> drives) noexcept {

@@ -5,12 +5,13 @@
 namespace proxarm::fieldbus {
 namespace {
 
-constexpr CyclicMode modes[] = {{"csp", 8, 0x607A00, false, "the drive can't do cyclic synchronous position (mode 8)",
-                                 "the drive took mode 8 (cyclic synchronous position) but didn't change to it"},
-                                {"ip", 7, 0x60C101, false, "the drive can't do interpolated position (mode 7)",
-                                 "the drive took mode 7 (interpolated position) but didn't change to it"},
-                                {"cst", 10, 0x607100, true, "the drive can't do cyclic synchronous torque (mode 10)",
-                                 "the drive took mode 10 (cyclic synchronous torque) but didn't change to it"}};
+constexpr CyclicMode modes[] = {
+    {"csp", 8, 0x607A00, false, 0, "the drive can't do cyclic synchronous position (mode 8)",
+     "the drive took mode 8 (cyclic synchronous position) but didn't change to it"},
+    {"ip", 7, 0x60C101, false, 0x0010, "the drive can't do interpolated position (mode 7)",
+     "the drive took mode 7 (interpolated position) but didn't change to it"},
+    {"cst", 10, 0x607100, true, 0, "the drive can't do cyclic synchronous torque (mode 10)",
+     "the drive took mode 10 (cyclic synchronous torque) but didn't change to it"}};
 
 }  // namespace
 

@@ -23,7 +23,8 @@ struct CyclicMode {
   std::uint8_t number;   // 6060h; 6502h has it as bit number − 1
   std::uint32_t target;  // as in description::DriveObjects
   bool torque;
-  const char* unsupported;  // what the user is told of a drive that hasn't got it, or that doesn't change to it
+  std::uint16_t controlword_bits;  // set with `enable operation`: that its targets are valid
+  const char* unsupported;         // what the user is told of a drive that hasn't got it, or that doesn't change to it
   const char* not_taken;
 };
 

@@ -3,14 +3,21 @@
 #include <algorithm>
 #include <limits>
 
-#include "models/base/setup_error.hpp"
-
 namespace proxarm::fieldbus {
 namespace {
 
 using Slots = std::span<const DriveSlot>;
 
 }  // namespace
+
+FrameHandler handed_to(Slots drives, const FrameHandler& other) {
+  return [drives, other](std::size_t bus, const TimedFrame& received) {
+    for (const DriveSlot& slot : drives) {
+      if (slot.bus == bus && slot.drive->on_frame(received.frame, received.time_ns)) return;
+    }
+    if (other) other(bus, received);
+  };
+}
 
 std::vector<SdoSequence> exchange(CanNetwork& network, Slots drives, const FrameHandler& handler,
                                   const StepsOf& steps_of, std::vector<std::uint64_t>* boot_ups) {
@@ -68,6 +75,12 @@ void send_nmt(CanNetwork& network, Slots drives, NmtCommand command, const char*
   }
 }
 
+std::int64_t longest_nmt_timeout_ns(Slots drives) noexcept {
+  std::int64_t longest_ns = 0;
+  for (const DriveSlot& slot : drives) longest_ns = std::max(longest_ns, slot.drive->settings().nmt_timeout_ns);
+  return longest_ns;
+}
+
 bool wait_for_state(CanNetwork& network, Slots drives, const FrameHandler& handler, NmtState state,
                     std::int64_t timeout_ns) {
   const std::int64_t deadline_ns = network.now_ns() + timeout_ns;
@@ -76,6 +89,16 @@ bool wait_for_state(CanNetwork& network, Slots drives, const FrameHandler& handl
                                  [state](const DriveSlot& slot) { return slot.drive->nmt_state() == state; });
     return all ? pump_done : deadline_ns;
   });
+}
+
+description::SetupError not_in_state(const ServoDrive& drive, NmtState wanted, const std::string& more,
+                                     const char* advice) {
+  return description::SetupError({.bus = drive.description().bus,
+                                  .node = drive.node(),
+                                  .message = "drive of " + drive.description().joint + ", NMT state in its heartbeat",
+                                  .found = std::string(to_string(drive.nmt_state())) + more,
+                                  .expected = std::string(to_string(wanted)),
+                                  .advice = advice});
 }
 
 }  // namespace proxarm::fieldbus

@@ -4,7 +4,6 @@
 
 #include "fieldbus/canopen/canopen_sync.hpp"
 #include "fieldbus/cia402/drive_exchange.hpp"
-#include "models/base/setup_error.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -36,6 +35,12 @@ bool is_started(const DriveSlot& slot) noexcept { return slot.drive->nmt_state()
 std::string name_of(const DriveSlot& slot) {
   const description::DriveDescription& drive = slot.drive->description();
   return "drive of " + drive.joint + " (bus " + drive.bus + ", node " + std::to_string(drive.node) + ")";
+}
+
+// Some stacks enter in 1003h:01 that an error went (code 0) while another one still stands.
+std::string text_of(const Emergency& error) {
+  if (error.code != 0) return describe(error);
+  return "an error (1001h:00 is " + hex_text(error.error_register, 2) + ")";
 }
 
 std::vector<DriveSlot> slots_of(const std::vector<HeldBack>& held) {
@@ -135,7 +140,7 @@ void reset_communication(const Start& start, Slots drives) {
   std::vector<std::uint64_t> boot_ups;
   for (const DriveSlot& slot : drives) boot_ups.push_back(slot.drive->boot_ups());
   send_nmt(start.network, drives, NmtCommand::reset_communication, "reset communication");
-  const std::int64_t deadline_ns = start.network.now_ns() + drives.front().drive->settings().nmt_timeout_ns;
+  const std::int64_t deadline_ns = start.network.now_ns() + longest_nmt_timeout_ns(drives);
   pump_frames(start.network, deadline_ns, start.handler, [&](std::int64_t) {
     bool all = true;
     for (std::size_t i = 0; i < drives.size(); ++i) all = all && drives[i].drive->boot_ups() != boot_ups[i];
@@ -157,7 +162,7 @@ constexpr Means means[] = {{"a fault reset", reset_fault},
 std::string help(const Start& start, std::vector<HeldBack>& held) {
   std::string tried;
   for (const HeldBack& drive : held) {
-    start.tell(name_of(drive.slot) + " holds " + describe(drive.error) +
+    start.tell(name_of(drive.slot) + " holds " + text_of(drive.error) +
                " from before this session, and refuses NMT start");
   }
   for (const Means& mean : means) {
@@ -179,8 +184,7 @@ void start_drives(CanNetwork& network, Slots drives, const FrameHandler& handler
                   const Tell& tell) {
   const Tell told = tell ? tell : [](const std::string&) {};
   const Start start{network, handler, configure_anew, told};
-  std::int64_t timeout_ns = 0;
-  for (const DriveSlot& slot : drives) timeout_ns = std::max(timeout_ns, slot.drive->settings().nmt_timeout_ns);
+  const std::int64_t timeout_ns = longest_nmt_timeout_ns(drives);
   send_nmt(network, drives, NmtCommand::start, "start");
   const std::int64_t deadline_ns = network.now_ns() + timeout_ns;
   if (wait_for_state(network, drives, handler, NmtState::operational, std::min(timeout_ns, looked_into_after_ns)))
@@ -191,14 +195,8 @@ void start_drives(CanNetwork& network, Slots drives, const FrameHandler& handler
   if (wait_for_state(network, drives, handler, NmtState::operational, left_ns)) return;
   const DriveSlot& slot =
       held.empty() ? *std::find_if_not(drives.begin(), drives.end(), is_started) : held.front().slot;
-  throw description::SetupError(
-      {.bus = slot.drive->description().bus,
-       .node = slot.drive->node(),
-       .message = "drive of " + slot.drive->description().joint + ", NMT state in its heartbeat",
-       .found = std::string(to_string(slot.drive->nmt_state())) +
-                (held.empty() ? "" : ", holding " + describe(held.front().error) + " after " + tried),
-       .expected = std::string(to_string(NmtState::operational)),
-       .advice = how_to_start});
+  throw not_in_state(*slot.drive, NmtState::operational,
+                     held.empty() ? "" : ", holding " + text_of(held.front().error) + " after " + tried, how_to_start);
 }
 
 }  // namespace proxarm::fieldbus

@@ -55,7 +55,9 @@ bool is_mapping(ObjectAddress object) noexcept {
 }
 
 void check_step(const EdsFile& eds, const SdoStep& step) {
-  const EdsObject& object = require(eds, number_of(step.object), 8 * step.bytes, step.name);
+  const bool advised = step.kind == SdoStep::Kind::write && *step.advice != '\0';
+  const EdsObject& object = require(eds, number_of(step.object), 8 * step.bytes,
+                                    advised ? std::string(step.name) + ": " + step.advice : std::string(step.name));
   if (!object.readable) refuse(eds, number_of(step.object), "AccessType", "wo", "one that can be read back");
   if (step.kind == SdoStep::Kind::write && !object.writable && step.as_found.empty()) {
     refuse(eds, number_of(step.object), "AccessType", "ro", "one that can be written: " + std::string(step.name));
@@ -145,7 +147,7 @@ std::vector<SdoStep> steps_by_eds(const std::vector<SdoStep>& steps, const EdsFi
     if (!can) {
       require_found(eds, step, drive.node);
       if (losses != nullptr) losses->fixed += (losses->fixed.empty() ? "" : ", ") + to_string(step.object);
-      if (losses != nullptr && step.is_optional) lose(losses->missing, loss_of(there, step, drive.node));
+      if (losses != nullptr) lose(losses->missing, loss_of(there, step, drive.node));
     }
     const std::pair<ObjectAddress, std::optional<std::uint32_t>> identity[] = {{{0x1018, 1}, eds.vendor},
                                                                                {{0x1018, 2}, eds.product}};

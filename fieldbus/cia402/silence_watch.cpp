@@ -12,7 +12,11 @@ constexpr std::uint16_t words_every_ms = 5, heartbeat_every_ms = 10;
 constexpr std::uint8_t on_change = 255;
 
 std::vector<SdoStep> words_steps(const ServoDrive& drive) {
-  std::vector<SdoStep> steps{sdo_write({0x1017, 0}, 2, heartbeat_every_ms, "producer heartbeat time")};
+  std::vector<SdoStep> steps;
+  // A node that produces heartbeats doesn't guard its life (CiA 301).
+  if (drive.description().bring_up.stops_by != description::StopsBy::life_guarding) {
+    steps.push_back(sdo_write({0x1017, 0}, 2, heartbeat_every_ms, "producer heartbeat time"));
+  }
   const PdoConfiguration words{.direction = PdoDirection::transmit,
                                .number = words_pdo,
                                .id = pdo_id(PdoDirection::transmit, words_pdo, drive.node()),
@@ -26,12 +30,20 @@ std::vector<SdoStep> words_steps(const ServoDrive& drive) {
 }  // namespace
 
 void ask_for_words(CanNetwork& network, std::span<const DriveSlot> drives) {
-  const FrameHandler to_drives = [&](std::size_t bus, const TimedFrame& received) {
-    for (const DriveSlot& slot : drives) {
-      if (slot.bus == bus && slot.drive->on_frame(received.frame, received.time_ns)) return;
-    }
-  };
-  (void)exchange(network, drives, to_drives, words_steps);
+  (void)exchange(network, drives, handed_to(drives), words_steps);
+}
+
+std::vector<DriveState> ask_for_states(CanNetwork& network, std::span<const DriveSlot> drives) {
+  const auto word = [](const ServoDrive& drive) { return object_address(drive.description().objects.statusword); };
+  const std::vector<SdoSequence> answers = exchange(network, drives, handed_to(drives), [&](const ServoDrive& drive) {
+    return std::vector<SdoStep>{sdo_read(word(drive), 2, "statusword")};
+  });
+  std::vector<DriveState> states;
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    const auto value = answers[i].value_of(word(*drives[i].drive));
+    states.push_back(value ? decode_state(static_cast<std::uint16_t>(*value)) : DriveState::unknown);
+  }
+  return states;
 }
 
 std::uint32_t SilenceWatch::wanted_id() const noexcept { return pdo_id(PdoDirection::transmit, words_pdo, node_); }

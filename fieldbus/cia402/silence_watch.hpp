@@ -17,6 +17,9 @@ namespace proxarm::fieldbus {
 // What the drives are asked to say in the silence; what one doesn't take is left out. Until the next set-up.
 void ask_for_words(CanNetwork& network, std::span<const DriveSlot> drives);
 
+// 6041h of each drive, read by SDO: also one that isn't in operational answers. Unknown: no answer.
+[[nodiscard]] std::vector<DriveState> ask_for_states(CanNetwork& network, std::span<const DriveSlot> drives);
+
 class SilenceWatch {
  public:
   explicit SilenceWatch(const ServoDrive& drive) noexcept : node_(drive.node()) {}

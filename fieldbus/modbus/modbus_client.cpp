@@ -2,6 +2,8 @@
 
 #include <arpa/inet.h>
 #include <modbus/modbus.h>
+#include <poll.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -27,15 +29,21 @@ using Context = std::unique_ptr<modbus_t, Free>;
 
 class LibmodbusClient final : public ModbusClient {
  public:
-  LibmodbusClient(Context context, bool serial) : context_(std::move(context)), serial_(serial) {}
+  LibmodbusClient(Context context, const ModbusLineDescription& line, double response_timeout_s)
+      : context_(std::move(context)),
+        serial_(line.serial()),
+        echo_(line.echo),
+        timeout_ms_(std::max(1, static_cast<int>(std::ceil(1e3 * response_timeout_s)))) {}
 
  private:
   ModbusResult transact(const ModbusMessage& request, ModbusMessage& answer) noexcept override {
     if (!connected_ && !reconnect()) return ModbusResult::closed;
+    if (serial_) modbus_flush(context_.get());  // an answer that came too late is for no request any more
     modbus_set_slave(context_.get(), request.bytes[0]);
     if (modbus_send_raw_request(context_.get(), request.bytes.data(), static_cast<int>(request.size)) < 0) {
       return give_up();
     }
+    if (echo_ && !swallow_echo(request)) return give_up();
     std::array<std::uint8_t, MODBUS_MAX_ADU_LENGTH> bytes{};
     const int received = modbus_receive_confirmation(context_.get(), bytes.data());
     if (received < 0) return give_up();
@@ -48,6 +56,20 @@ class LibmodbusClient final : public ModbusClient {
     answer.size = static_cast<std::size_t>(last - first);
     std::copy(bytes.begin() + first, bytes.begin() + last, answer.bytes.begin());
     return ModbusResult::ok;
+  }
+
+  // The request and its checksum, which come back before the answer. Another byte is a collision on the line.
+  bool swallow_echo(const ModbusMessage& request) noexcept {
+    constexpr std::size_t checksum_bytes = 2;
+    for (std::size_t i = 0; i < request.size + checksum_bytes; ++i) {
+      pollfd waiting{.fd = modbus_get_socket(context_.get()), .events = POLLIN, .revents = 0};
+      std::uint8_t byte = 0;
+      const bool came = poll(&waiting, 1, timeout_ms_) > 0 && ::read(waiting.fd, &byte, 1) == 1;
+      if (came && (i >= request.size || byte == request.bytes[i])) continue;
+      errno = came ? EMBBADDATA : ETIMEDOUT;
+      return false;
+    }
+    return true;
   }
 
   ModbusResult give_up() noexcept {
@@ -75,7 +97,8 @@ class LibmodbusClient final : public ModbusClient {
   }
 
   Context context_;
-  bool serial_;
+  bool serial_, echo_;
+  int timeout_ms_;
   bool connected_ = true;
 };
 
@@ -148,7 +171,7 @@ std::unique_ptr<ModbusClient> open_modbus(const ModbusLineDescription& line, dou
   set_timeouts(*context, std::max(response_timeout_s, 0.2));  // to connect
   if (modbus_connect(context.get()) != 0) throw fail(errno);
   set_timeouts(*context, response_timeout_s);
-  return std::make_unique<LibmodbusClient>(std::move(context), line.serial());
+  return std::make_unique<LibmodbusClient>(std::move(context), line, response_timeout_s);
 }
 
 }  // namespace proxarm::fieldbus

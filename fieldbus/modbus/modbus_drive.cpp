@@ -175,9 +175,11 @@ void ModbusDrive::note(ModbusResult result, int exception, std::int64_t now_ns) 
     last_answer_ns_ = now_ns;
     answered_ = true;
     answer_.time_ns = now_ns;
+    answer_.noise = DriveFault::none;
   } else {
     const bool busy = result == ModbusResult::exception && exception == modbus_busy;
     const bool noise = result == ModbusResult::timeout || result == ModbusResult::malformed || busy;
+    answer_.noise = busy ? DriveFault::modbus_timeout : fault_of(result);
     if (answer_.fault == DriveFault::none && (!noise || now_ns - last_answer_ns_ > stale_ns_)) {
       answer_.fault = fault_of(result);
       answer_.exception = exception;
@@ -302,7 +304,7 @@ void ModbusDrive::judge() noexcept {
   if (!wanted) return;
   if (state_ == DriveState::fault) raise(DriveFault::state_fault);
   if (feedback_.fault != DriveFault::none) raise(feedback_.fault);
-  if (!fresh_) raise(DriveFault::modbus_timeout);
+  if (!fresh_) raise(feedback_.noise == DriveFault::none ? DriveFault::modbus_timeout : feedback_.noise);
   if (was_following && !following_) raise(DriveFault::left_operation);
 }
 

@@ -88,6 +88,7 @@ class ModbusDrive final : public CyclicDrive {
     std::int32_t position_counts = 0;
     std::uint32_t status = 0;
     DriveFault fault = DriveFault::none;
+    DriveFault noise = DriveFault::none;  // what is wrong with the latest answer, while that is tolerated
     int exception = 0;
     double rate_Hz = 0.0;
   };

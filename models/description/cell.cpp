@@ -96,6 +96,7 @@ ModbusLineDescription read_modbus_line(const YamlNode& node) {
   line.baud = static_cast<int>(node.integer_or("baud", line.baud, 1200, 4'000'000));
   line.parity = node.choice_or("parity", line.parity, {"none", "even", "odd"});
   line.stop_bits = static_cast<int>(node.integer_or("stop_bits", line.stop_bits, 1, 2));
+  line.echo = node.boolean_or("echo", false);
   return line;
 }
 
@@ -216,20 +217,52 @@ std::vector<DriveFeedback> read_feedback(const YamlNode& node, const DriveDescri
   return feedback;
 }
 
-// What a drive needs to come up besides what the profile has.
-void read_bring_up(const YamlNode& node, DriveDescription& drive) {
-  if (node.has("enable_timeout_s")) drive.enable_timeout_s = node.number("enable_timeout_s", 0.5, 60.0);
-  if (!drive.on_can()) {
-    drive.word_order_tried = node.boolean_or("word_order_tried", false);
-    return;
+std::vector<StartUpWrite> read_writes(const YamlNode& node) {
+  std::vector<StartUpWrite> writes;
+  for (const YamlNode& each : node.list("write", 1, 32)) {
+    const std::int64_t bits = integer_of(each, "bits", {8, 16, 32});
+    const std::int64_t value =
+        each.integer("value", std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::uint32_t>::max());
+    const std::int64_t most = (std::int64_t{1} << bits) - 1;
+    if (value > most || value < -(most / 2) - 1) {
+      throw each.error_at("value", "a number of " + std::to_string(bits) + " bits", std::to_string(value));
+    }
+    writes.push_back({read_object(each, "object"), static_cast<std::uint8_t>(bits), static_cast<std::uint32_t>(value)});
   }
-  drive.shows_mode_enabled = node.choice_or("mode_shown", "before", {"before", "enabled"}) == "enabled";
+  return writes;
+}
+
+// The cycle must see the mode of a drive that shows it late.
+void require_mode_in_feedback(const YamlNode& node, const DriveDescription& drive) {
   const auto is_display = [&](const DriveFeedback& more) {
     return more.object == drive.objects.mode_display && more.bits == 8;
   };
-  if (drive.shows_mode_enabled && std::none_of(drive.feedback.begin(), drive.feedback.end(), is_display)) {
-    throw node.error_at("mode_shown", "`feedback` with {object: \"0x6061\", bits: 8}: the cycle must see the mode");
+  if (std::any_of(drive.feedback.begin(), drive.feedback.end(), is_display)) return;
+  throw node.error_at("mode_shown", "`feedback` with {object: \"0x6061\", bits: 8}: the cycle must see the mode");
+}
+
+BringUp read_bring_up(const YamlNode& node, const DriveDescription& drive) {
+  BringUp b;
+  if (node.has("enable_timeout_s")) b.enable_timeout_s = node.number("enable_timeout_s", 0.5, 60.0);
+  if (!drive.on_can()) return b;
+  b.start_timeout_s = node.number_or("start_timeout_s", b.start_timeout_s, 0.5, 60.0);
+  b.answer_timeout_s = node.number_or("answer_timeout_s", b.answer_timeout_s, 0.02, 5.0);
+  b.shows_mode_enabled = node.choice_or("mode_shown", "before", {"before", "enabled"}) == "enabled";
+  if (b.shows_mode_enabled) require_mode_in_feedback(node, drive);
+  const std::string stops_by =
+      node.choice_or("stops_by", "heartbeat", {"heartbeat", "setpoint_timer", "life_guarding"});
+  b.stops_by = stops_by == "heartbeat"        ? StopsBy::heartbeat
+               : stops_by == "setpoint_timer" ? StopsBy::setpoint_timer
+                                              : StopsBy::life_guarding;
+  b.controlword_bits = static_cast<std::uint16_t>(node.integer_or("controlword_bits", 0, 0, 0xFFFF));
+  if ((b.controlword_bits & ~free_controlword_bits) != 0) {
+    throw node.error_at("controlword_bits", "bits 4 to 6, 9 and 11 to 15 (0xFA70): the others are the state machine's");
   }
+  if (node.has("skip")) {
+    for (const YamlNode& each : node.list("skip", 1, 32)) b.skip.push_back(read_object(each, "object"));
+  }
+  if (node.has("write")) b.write = read_writes(node);
+  return b;
 }
 
 DriveDescription read_drive(const YamlNode& node) {
@@ -255,7 +288,8 @@ DriveDescription read_drive(const YamlNode& node) {
     d.fd = node.boolean_or("fd", false);
     if (node.has("feedback")) d.feedback = read_feedback(node, d);
   }
-  read_bring_up(node, d);
+  if (!d.on_can()) d.word_order_tried = node.boolean_or("word_order_tried", false);
+  if (const auto bring_up = node.find_map("bring_up")) d.bring_up = read_bring_up(*bring_up, d);
   if (node.has("device_type")) {
     d.device_type = static_cast<std::uint32_t>(node.integer("device_type", 0, 0xffffffff));
   }

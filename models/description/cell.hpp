@@ -44,6 +44,7 @@ struct ModbusLineDescription {
   int baud = 115200;
   std::string parity = "even";  // none, even, odd
   int stop_bits = 1;
+  bool echo = false;  // RTU: the adapter receives what it sends, as some on RS-485 do
 
   [[nodiscard]] bool serial() const noexcept { return host.empty(); }
 };
@@ -95,6 +96,38 @@ struct DriveFeedback {
   std::uint8_t bits = 0;     // 8, 16, 32
 };
 
+// An object that is written before the PDOs are mapped, and read back.
+struct StartUpWrite {
+  std::uint32_t object = 0;  // index << 8 | sub-index
+  std::uint8_t bits = 0;     // 8, 16, 32
+  std::uint32_t value = 0;   // as the bytes are
+};
+
+// What stops a drive by itself when the controller is gone.
+enum class StopsBy : std::uint8_t {
+  heartbeat,       // 1016h: it misses the controller's heartbeat
+  setpoint_timer,  // 1400h:05 alone: it misses its setpoints
+  life_guarding,   // 100Ch, 100Dh: nobody asks for its state any more
+};
+
+// What a drive needs to come up besides what the profile has, as its manual or its stack wants it.
+struct BringUp {
+  std::optional<double> enable_timeout_s;  // from where operation is wanted to where it takes targets; none: the
+                                           // session's, 5 s
+  // cia402:
+  double start_timeout_s = 2.0;     // until it first answers, and until a change of its NMT state shows
+  double answer_timeout_s = 0.2;    // of each SDO request, which is sent three times
+  bool shows_mode_enabled = false;  // 6061h shows the mode only once operation is enabled
+  StopsBy stops_by = StopsBy::heartbeat;
+  std::uint16_t controlword_bits = 0;  // set with `enable operation`, besides the mode's own
+  std::vector<std::uint32_t> skip;     // optional objects that aren't touched, as index << 8 | sub-index
+  std::vector<StartUpWrite> write;     // in this order
+};
+
+// Bits of the controlword that a mode or a maker may want set (CiA 402: 4 to 6 and 9, the mode's; 11 to 15, the
+// maker's).
+inline constexpr std::uint16_t free_controlword_bits = 0xFA70;
+
 struct DriveDescription {
   std::string joint;      // name in the URDF; of a linear one, read m for rad, N for Nm and kg for kg m² all along
   std::string bus;        // CAN bus or Modbus line
@@ -118,10 +151,8 @@ struct DriveDescription {
                                  // 0: not said
   double max_torque_Nm = 0.0;    // mode cst: what the joint may be asked for; others: what the drive has at
                                  // the joint, which its setpoints are kept to; 0: not said
-  // From where operation is wanted to where it takes targets; none: the session's, 5 s.
-  std::optional<double> enable_timeout_s;
+  BringUp bring_up;
   bool word_order_tried = false;            // modbus: somebody has seen that the file's word_order is this drive's
-  bool shows_mode_enabled = false;          // cia402: 6061h shows the mode only once operation is enabled
   std::optional<HomingDescription> homing;  // of an incremental encoder; none: an absolute one
   double rotor_inertia_kg_m2 = 0.0;         // reflected to the joint
   double position_bandwidth_Hz = 100.0;     // of the drive's position loop, as its maker or a test states it: the lag

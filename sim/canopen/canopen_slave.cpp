@@ -45,6 +45,8 @@ void CanopenSlave::add_communication_objects() {
   };
   od.add(0x1006, 0, unsigned32, read_write, 0);
   sync_window_ = &od.add(0x1007, 0, unsigned32, read_write, 0);
+  od.add(0x100C, 0, unsigned16, read_write, 0);
+  od.add(0x100D, 0, unsigned8, read_write, 0);
   od.add_text(0x1008, 0, config_.device_name);
   od.add_text(0x1009, 0, "simulated");
   od.add_text(0x100A, 0, "1.0");
@@ -96,7 +98,8 @@ void CanopenSlave::start_over(bool whole_device, std::int64_t time_ns) {
   heartbeat_period_ns_ = 0;
   sdo_.reset();
   errors_.clear();
-  last_sync_ns_ = never;
+  last_sync_ns_ = last_guard_ns_ = never;
+  life_lost_ = toggle_ = false;
   boot_ns_ = time_ns + config_.boot_time_ns;
   if (whole_device) application_.on_reset(time_ns);
 }
@@ -144,13 +147,17 @@ bool CanopenSlave::refuses_start() const noexcept {
 }
 
 void CanopenSlave::send_state(NmtState state, std::int64_t time_ns) noexcept {
-  const std::uint8_t byte = static_cast<std::uint8_t>(state);
-  if (!heartbeat_muted_) port_.send(make_frame(0x700u + config_.node, {&byte, 1}), time_ns);
+  if (quirks_.toggles_heartbeat) toggle_ = !toggle_;
+  const bool sets_bit_7 = quirks_.toggles_heartbeat && toggle_ && state != NmtState::initialising;
+  const auto byte = static_cast<std::uint8_t>(static_cast<unsigned>(state) | (sets_bit_7 ? 0x80U : 0U));
+  if (!quirks_.mutes_heartbeat) port_.send(make_frame(0x700u + config_.node, {&byte, 1}), time_ns);
 }
 
 // ---- Frames in
 
 void CanopenSlave::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
+  const bool is_guarded = frame.remote && !frame.extended && frame.id == 0x700u + config_.node;
+  if (is_guarded && state_ != NmtState::initialising) return on_guard_request(time_ns);
   if (frame.extended || frame.remote || frame.error || frame.length > (frame.fd ? 64 : 8)) return;
   if (frame.fd != (config_.fd && is_pdo(frame.id))) return;  // all services but PDOs stay with classic frames
   if (state_ == NmtState::initialising) return;
@@ -172,16 +179,31 @@ bool CanopenSlave::is_pdo(std::uint32_t id) const noexcept {
 }
 
 void CanopenSlave::on_sdo(const fieldbus::CanFrame& frame, std::int64_t time_ns) {
-  if (frame.length != 8 || sdo_muted_) return;
+  if (frame.length != 8 || quirks_.mutes_sdo) return;
   SdoServer::Message request;
   std::copy_n(frame.data.begin(), 8, request.begin());
   last_sdo_ns_ = time_ns;
   for (const SdoServer::Message& message : sdo_.on_request(request)) {
-    port_.send(make_frame(0x580u + config_.node, message), time_ns + config_.sdo_answer_time_ns);
+    answer_sdo(message, time_ns + config_.sdo_answer_time_ns + quirks_.sdo_late_ns);
   }
 }
 
+void CanopenSlave::answer_sdo(SdoServer::Message message, std::int64_t time_ns) noexcept {
+  constexpr unsigned kind_mask = 0xE3, expedited_with_size = 0x43, expedited = 0x42;
+  if (quirks_.sdo_sizeless && (message[0] & kind_mask) == expedited_with_size) message[0] = expedited;
+  const auto id = 0x580u + config_.node;
+  if (quirks_.sdo_stray) {
+    SdoServer::Message stray = message;
+    stray[1] = 0xFF;
+    stray[2] = 0x5F;  // 5FFFh
+    port_.send(make_frame(id, stray), time_ns);
+  }
+  port_.send(make_frame(id, message), time_ns);
+  if (quirks_.sdo_doubled) port_.send(make_frame(id, message), time_ns);
+}
+
 void CanopenSlave::on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns) {
+  if (quirks_.hears_no_sync_in > 0 && ++syncs_ % quirks_.hears_no_sync_in == 0) return;
   if (frame.length != 0) {  // 1019h is 0: no counter expected
     raise_error(emcy::sync_length, error_register::communication, time_ns);
     return;
@@ -261,6 +283,7 @@ void CanopenSlave::on_time(std::int64_t time_ns) noexcept {
   }
   if (time_ns - last_sdo_ns_ > sdo_timeout) sdo_.reset();
   check_heartbeats(time_ns);
+  check_life_guarding(time_ns);
   const bool lazy = is_lazy(config_.stack);
   if (lazy && talks()) check_sync(time_ns);
   if (state_ != NmtState::operational) return;
@@ -277,6 +300,26 @@ void CanopenSlave::check_heartbeats(std::int64_t time_ns) {
     application_.on_communication_lost(emcy::heartbeat_lost, time_ns);
     error_behaviour(time_ns);
   }
+}
+
+// Node guarding isn't for a node that produces heartbeats (CiA 301).
+void CanopenSlave::on_guard_request(std::int64_t time_ns) noexcept {
+  if (heartbeat_period_ns_ > 0) return;
+  last_guard_ns_ = time_ns;
+  if (life_lost_ && !latches() && !insists()) clear_error(emcy::heartbeat_lost, time_ns);
+  life_lost_ = false;
+  toggle_ = !toggle_;
+  const auto byte = static_cast<std::uint8_t>(static_cast<unsigned>(state_) | (toggle_ ? 0U : 0x80U));
+  port_.send(make_frame(0x700u + config_.node, {&byte, 1}), time_ns);
+}
+
+void CanopenSlave::check_life_guarding(std::int64_t time_ns) {
+  const std::int64_t life_ns = dictionary_.number(0x100C) * dictionary_.number(0x100D) * millisecond;
+  if (life_ns == 0 || last_guard_ns_ == never || life_lost_ || time_ns - last_guard_ns_ <= life_ns) return;
+  life_lost_ = true;
+  raise_error(emcy::heartbeat_lost, error_register::communication, time_ns);
+  application_.on_communication_lost(emcy::heartbeat_lost, time_ns);
+  error_behaviour(time_ns);
 }
 
 // A lazy stack's: told, and nothing else.
@@ -338,11 +381,12 @@ void CanopenSlave::transmit(Transmit& pdo, const std::array<std::uint8_t, 64>& d
   pdo.last = data;
   pdo.last_ns = time_ns;
   pdo.syncs = 0;
-  const auto length = static_cast<std::size_t>(fieldbus::padded_length(pdo.pdo.length(), config_.fd));
+  const int bytes = quirks_.tpdo_bytes < 0 ? pdo.pdo.length() : quirks_.tpdo_bytes;
+  const auto length = static_cast<std::size_t>(fieldbus::padded_length(bytes, config_.fd));
   fieldbus::CanFrame frame = make_frame(pdo.pdo.identifier(), {data.data(), length});
   frame.fd = frame.bit_rate_switch = config_.fd;
   port_.send(frame, time_ns);
-  if (!twin_) return;
+  if (!quirks_.has_twin) return;
   frame.data[2] ^= 0x40U;  // in the position
   port_.send(frame, time_ns);
 }
@@ -402,6 +446,11 @@ void CanopenSlave::send_emergency(std::uint16_t code, std::int64_t time_ns) noex
   dictionary_.at(0x1001).set(bits);
   const std::array<std::uint8_t, 8> bytes{
       static_cast<std::uint8_t>(code), static_cast<std::uint8_t>(code >> 8), bits, 0, 0, 0, 0, 0};
+  if (talks()) port_.send(make_frame(0x80u + config_.node, bytes), time_ns);
+}
+
+void CanopenSlave::say_warning(std::uint16_t code, std::int64_t time_ns) noexcept {
+  const std::array<std::uint8_t, 8> bytes{static_cast<std::uint8_t>(code), static_cast<std::uint8_t>(code >> 8)};
   if (talks()) port_.send(make_frame(0x80u + config_.node, bytes), time_ns);
 }
 

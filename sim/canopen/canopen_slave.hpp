@@ -8,6 +8,7 @@
 //   080: (empty)                  SYNC (identifier from 1005h)
 //   080 + node: code u16, error register u8, 5 bytes of the maker's       EMCY
 //   580 + node, 600 + node        SDO answers and requests
+//   700 + node, remote request    node guarding: answered by the state, bit 7 toggling, while 1017h is 0
 //   700 + node: state             boot-up 00; heartbeat 04 stopped, 05 operational, 7F pre-operational
 #pragma once
 
@@ -21,6 +22,7 @@
 #include "sim/canopen/object_dictionary.hpp"
 #include "sim/canopen/sdo_server.hpp"
 #include "sim/canopen/slave_pdo.hpp"
+#include "sim/canopen/slave_quirks.hpp"
 #include "sim/canopen/stack_behaviour.hpp"
 
 namespace proxarm::sim {
@@ -97,11 +99,10 @@ class CanopenSlave final : public BusDevice {
   // A fault reset: errors of the connection that a latching stack has kept go, if their cause has.
   void acknowledge(std::int64_t time_ns) noexcept;
 
-  // Faults for tests: no heartbeat leaves any more; SDO requests stay unanswered.
-  void mute_heartbeat(bool mute) noexcept { heartbeat_muted_ = mute; }
-  void mute_sdo(bool mute) noexcept { sdo_muted_ = mute; }
-  // Another node with the same number is on the bus: each of its transmit PDOs comes as well, with another position.
-  void add_twin(bool twin) noexcept { twin_ = twin; }
+  [[nodiscard]] SlaveQuirks& quirks() noexcept { return quirks_; }
+  // A boot-up frame of its own accord, and an EMCY that changes nothing (error register 0).
+  void say_boot_up(std::int64_t time_ns) noexcept { send_state(NmtState::initialising, time_ns); }
+  void say_warning(std::uint16_t code, std::int64_t time_ns) noexcept;
 
  private:
   static constexpr int pdos = 4;
@@ -146,6 +147,8 @@ class CanopenSlave final : public BusDevice {
   void on_receive_pdo(Receive& receive, const fieldbus::CanFrame& frame, std::int64_t time_ns);
   void on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
   void check_heartbeats(std::int64_t time_ns);
+  void on_guard_request(std::int64_t time_ns) noexcept;
+  void check_life_guarding(std::int64_t time_ns);
   void check_receive_pdos(std::int64_t time_ns, bool synchronous, bool others);
   void check_sync(std::int64_t time_ns);
   [[nodiscard]] bool latches() const noexcept { return config_.stack == StackBehaviour::latching; }
@@ -159,6 +162,7 @@ class CanopenSlave final : public BusDevice {
   [[nodiscard]] SdoAbort check_consumer(std::uint8_t subindex, std::int64_t value) const noexcept;
   void error_behaviour(std::int64_t time_ns);
   void send_emergency(std::uint16_t code, std::int64_t time_ns) noexcept;
+  void answer_sdo(SdoServer::Message message, std::int64_t time_ns) noexcept;
   void send_state(NmtState state, std::int64_t time_ns) noexcept;
   [[nodiscard]] bool talks() const noexcept {
     return state_ == NmtState::pre_operational || state_ == NmtState::operational;
@@ -181,9 +185,11 @@ class CanopenSlave final : public BusDevice {
   std::int64_t heartbeat_period_ns_ = 0;
   std::int64_t last_sync_ns_ = never;
   std::int64_t last_sdo_ns_ = 0;
-  bool heartbeat_muted_ = false;
-  bool sdo_muted_ = false;
-  bool twin_ = false;
+  std::int64_t last_guard_ns_ = never;  // monitored once the first request has come
+  bool life_lost_ = false;
+  SlaveQuirks quirks_;
+  std::uint32_t syncs_ = 0;  // since power on
+  bool toggle_ = false;      // of the next heartbeat
 };
 
 }  // namespace proxarm::sim

@@ -91,11 +91,11 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   return c;
 }
 
-// A drive that lacks an object, has it read-only, or takes no value for it.
+// A drive that lacks an object, has it read-only, has another value in it, or takes none for it.
 void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
-  const bool is_missing = fault.kind == DeviceFaultKind::object_missing;
-  const bool is_refused = fault.kind == DeviceFaultKind::value_refused;
-  if (!is_missing && !is_refused && fault.kind != DeviceFaultKind::object_fixed) return;
+  constexpr DeviceFaultKind of_objects[] = {DeviceFaultKind::object_missing, DeviceFaultKind::object_fixed,
+                                            DeviceFaultKind::object_holds, DeviceFaultKind::value_refused};
+  if (std::find(std::begin(of_objects), std::end(of_objects), fault.kind) == std::end(of_objects)) return;
   ObjectEntry* entry =
       dictionary.find(static_cast<std::uint16_t>(fault.value >> 8), static_cast<std::uint8_t>(fault.value));
   if (entry == nullptr) {
@@ -103,12 +103,31 @@ void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
                       .found = "an object that the simulated drive of " + fault.device + " hasn't",
                       .expected = "index and sub-index of one that it has, such as 0x600700"});
   }
-  if (is_missing) {
-    entry->hidden = true;
-  } else if (is_refused) {
-    entry->before_write = [](std::int64_t) { return SdoAbort::invalid_value; };
-  } else {
-    entry->access = Access::read_only;
+  switch (fault.kind) {
+    case DeviceFaultKind::object_missing:
+      entry->hidden = true;
+      return;
+    case DeviceFaultKind::object_holds:
+      entry->set(fault.content);
+      entry->default_value = entry->value;
+      return;
+    case DeviceFaultKind::value_refused:
+      entry->before_write = [code = static_cast<SdoAbort>(fault.content)](std::int64_t) { return code; };
+      return;
+    default:
+      entry->access = Access::read_only;
+  }
+}
+
+// A drive whose mapping may hold only what its mode knows.
+void map_only_in_a_mode(ObjectDictionary& dictionary) {
+  constexpr std::uint16_t mappings[] = {0x1600, 0x1A00};
+  for (const std::uint16_t mapping : mappings) {
+    ObjectEntry& entry = dictionary.at(mapping, 1);
+    entry.before_write = [&dictionary, before = entry.before_write](std::int64_t value) {
+      if (dictionary.number(0x6060) == 0) return SdoAbort::not_in_present_device_state;
+      return before ? before(value) : SdoAbort::none;
+    };
   }
 }
 
@@ -236,6 +255,10 @@ void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& confi
     if (fault.device != drive.joint) continue;
     make_otherwise(fault, drives_[axis]->canopen().dictionary());
     if (fault.kind == DeviceFaultKind::mode_late) drives_[axis]->show_mode_late(true);
+    if (fault.kind == DeviceFaultKind::mode_first) map_only_in_a_mode(drives_[axis]->canopen().dictionary());
+    if (fault.kind == DeviceFaultKind::bits_wanted) {
+      drives_[axis]->want_controlword_bits(static_cast<std::uint16_t>(fault.value));
+    }
   }
 }
 

@@ -1,6 +1,7 @@
 // What can be wrong with the devices of a simulated cell, and when: of SimulatedCell.
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "models/base/setup_error.hpp"
 #include "sim/cell/plant_axis.hpp"
@@ -48,6 +49,61 @@ void require_fault_of_mode(const DeviceFault& fault, const description::DriveDes
                     .found = "runaway for " + drive.joint + ", whose drive takes torques (mode cst)",
                     .expected = "a fault of what it does with a torque: reversed (the other sign) or ignored (the last "
                                 "one acts on)"});
+}
+
+constexpr std::pair<DeviceFaultKind, ModbusFault> modbus_faults[] = {
+    {DeviceFaultKind::drive_silent, ModbusFault::silent},
+    {DeviceFaultKind::power_loss, ModbusFault::silent},
+    {DeviceFaultKind::modbus_exception, ModbusFault::exception},
+    {DeviceFaultKind::modbus_lost, ModbusFault::lost},
+    {DeviceFaultKind::modbus_closed, ModbusFault::closed},
+    {DeviceFaultKind::modbus_wrong_unit, ModbusFault::wrong_unit},
+    {DeviceFaultKind::modbus_wrong_function, ModbusFault::wrong_function},
+    {DeviceFaultKind::modbus_wrong_count, ModbusFault::wrong_count},
+    {DeviceFaultKind::modbus_half, ModbusFault::half},
+    {DeviceFaultKind::modbus_low_first, ModbusFault::low_word_first},
+    {DeviceFaultKind::modbus_forgets, ModbusFault::forgets},
+    {DeviceFaultKind::modbus_no_function_23, ModbusFault::no_function_23},
+    {DeviceFaultKind::modbus_not_ready, ModbusFault::not_ready},
+    {DeviceFaultKind::modbus_not_driven, ModbusFault::not_driven},
+    {DeviceFaultKind::modbus_tripped, ModbusFault::tripped}};
+
+// What a drive does otherwise on the wire.
+void set_quirk(SlaveQuirks& quirks, const DeviceFault& fault, bool on) noexcept {
+  switch (fault.kind) {
+    case DeviceFaultKind::heartbeat_lost:
+      quirks.mutes_heartbeat = on;
+      return;
+    case DeviceFaultKind::sdo_silent:
+      quirks.mutes_sdo = on;
+      return;
+    case DeviceFaultKind::twin:
+      quirks.has_twin = on;
+      return;
+    case DeviceFaultKind::sdo_late:
+      quirks.sdo_late_ns = on ? std::int64_t{fault.value} * 1'000'000 : 0;
+      return;
+    case DeviceFaultKind::sdo_stray:
+      quirks.sdo_stray = on;
+      return;
+    case DeviceFaultKind::sdo_sizeless:
+      quirks.sdo_sizeless = on;
+      return;
+    case DeviceFaultKind::sdo_doubled:
+      quirks.sdo_doubled = on;
+      return;
+    case DeviceFaultKind::guarding:
+      quirks.toggles_heartbeat = on;
+      return;
+    case DeviceFaultKind::sync_lost:
+      quirks.hears_no_sync_in = on ? fault.value : 0;
+      return;
+    case DeviceFaultKind::tpdo_bytes:
+      quirks.tpdo_bytes = on ? static_cast<int>(fault.value) : -1;
+      return;
+    default:
+      return;
+  }
 }
 
 }  // namespace
@@ -108,10 +164,6 @@ void SimulatedCell::set_drive_fault(std::size_t axis, const DeviceFault& fault, 
     case DeviceFaultKind::drive_fault:
       if (on) drives_[axis]->inject_fault(static_cast<std::uint16_t>(fault.value), time_ns);
       return;
-    case DeviceFaultKind::heartbeat_lost:
-      return drives_[axis]->canopen().mute_heartbeat(on);
-    case DeviceFaultKind::sdo_silent:
-      return drives_[axis]->canopen().mute_sdo(on);
     case DeviceFaultKind::period_fixed:
       return drives_[axis]->fix_period_while_enabled(on);
     case DeviceFaultKind::sto_open:
@@ -120,49 +172,29 @@ void SimulatedCell::set_drive_fault(std::size_t axis, const DeviceFault& fault, 
       return drives_[axis]->never_say_following(on);
     case DeviceFaultKind::mode_changed:
       return drives_[axis]->show_mode(on ? std::optional(static_cast<std::int8_t>(fault.value)) : std::nullopt);
-    case DeviceFaultKind::twin:
-      return drives_[axis]->canopen().add_twin(on);
     case DeviceFaultKind::power_loss:
       if (on) plant_.servo(axis).disable();
       return nodes_[node_of_axis_[axis]]->set_power(!on, time_ns);
     case DeviceFaultKind::jammed:
       return plant_.arm().jam(axis, on);
-    default:
+    case DeviceFaultKind::boot_up:
+      if (on) drives_[axis]->canopen().say_boot_up(time_ns);
       return;
+    case DeviceFaultKind::warning:
+      if (on) drives_[axis]->canopen().say_warning(static_cast<std::uint16_t>(fault.value), time_ns);
+      return;
+    default:
+      return set_quirk(drives_[axis]->canopen().quirks(), fault, on);
   }
 }
 
 void SimulatedCell::set_modbus_fault(std::size_t axis, const DeviceFault& fault, bool on) noexcept {
-  ModbusFault kind = ModbusFault::none;
-  switch (fault.kind) {
-    case DeviceFaultKind::drive_silent:
-      kind = ModbusFault::silent;
-      break;
-    case DeviceFaultKind::power_loss:
-      if (on) plant_.servo(axis).disable();
-      kind = ModbusFault::silent;
-      break;
-    case DeviceFaultKind::modbus_exception:
-      kind = ModbusFault::exception;
-      break;
-    case DeviceFaultKind::modbus_busy:
-      kind = ModbusFault::busy;
-      break;
-    case DeviceFaultKind::modbus_closed:
-      kind = ModbusFault::closed;
-      break;
-    case DeviceFaultKind::modbus_wrong_unit:
-      kind = ModbusFault::wrong_unit;
-      break;
-    case DeviceFaultKind::modbus_half:
-      kind = ModbusFault::half;
-      break;
-    case DeviceFaultKind::jammed:
-      return plant_.arm().jam(axis, on);
-    default:
-      return;
-  }
-  modbus_drives_[axis]->set_fault(on ? kind : ModbusFault::none);
+  if (fault.kind == DeviceFaultKind::jammed) return plant_.arm().jam(axis, on);
+  if (fault.kind == DeviceFaultKind::power_loss && on) plant_.servo(axis).disable();
+  const auto* known = std::find_if(std::begin(modbus_faults), std::end(modbus_faults),
+                                   [&](const auto& pair) { return pair.first == fault.kind; });
+  if (known == std::end(modbus_faults)) return;
+  modbus_drives_[axis]->set_fault(on ? known->second : ModbusFault::none, fault.value);
 }
 
 SensorFaults& SimulatedCell::sensor_faults() noexcept {

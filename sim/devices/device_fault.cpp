@@ -14,7 +14,9 @@ namespace {
 using description::SetupError;
 
 constexpr unsigned can = 1, modbus = 2, drives = can | modbus, sensor = 4;  // FaultyDevice
-constexpr std::uint64_t none = 0, u16 = 0xFFFF, u24 = 0xFFFFFF, u32 = 0xFFFFFFFF, last_channel = 5, last_mode = 10;
+constexpr std::uint64_t none = 0, u16 = 0xFFFF, u24 = 0xFFFFFF, u32 = 0xFFFFFFFF, last_channel = 5, last_mode = 10,
+                        longest_late_ms = 10'000, last_exception = 11, classic_bytes = 8;
+constexpr std::uint32_t refused_by_value = 0x06090030;
 using ParseAmount = double (*)(std::string_view text, std::string_view option);
 
 struct KindName {
@@ -32,7 +34,10 @@ constexpr KindName kinds[] = {
     {"device_type", can, DeviceFaultKind::device_type, u32},
     {"lacks", can, DeviceFaultKind::object_missing, u24},
     {"fixed", can, DeviceFaultKind::object_fixed, u24},
+    {"holds", can, DeviceFaultKind::object_holds, u24},
     {"refuses", can, DeviceFaultKind::value_refused, u24},
+    {"wants_bits", can, DeviceFaultKind::bits_wanted, u16},
+    {"mode_first", can, DeviceFaultKind::mode_first, none},
     {"mode_late", can, DeviceFaultKind::mode_late, none},
     {"homed", can, DeviceFaultKind::homed, none},
     {"heartbeat", can, DeviceFaultKind::heartbeat_lost, none},
@@ -42,6 +47,15 @@ constexpr KindName kinds[] = {
     {"bit12", can, DeviceFaultKind::bit_12_missing, none},
     {"mode", can, DeviceFaultKind::mode_changed, last_mode},
     {"twin", can, DeviceFaultKind::twin, none},
+    {"sdo_late", can, DeviceFaultKind::sdo_late, longest_late_ms},
+    {"sdo_stray", can, DeviceFaultKind::sdo_stray, none},
+    {"sdo_sizeless", can, DeviceFaultKind::sdo_sizeless, none},
+    {"sdo_doubled", can, DeviceFaultKind::sdo_doubled, none},
+    {"guarding", can, DeviceFaultKind::guarding, none},
+    {"boot_up", can, DeviceFaultKind::boot_up, none},
+    {"warning", can, DeviceFaultKind::warning, u16},
+    {"sync_lost", can, DeviceFaultKind::sync_lost, u16},
+    {"tpdo_bytes", can, DeviceFaultKind::tpdo_bytes, classic_bytes},
     {"power", drives, DeviceFaultKind::power_loss, none},
     {"jammed", drives, DeviceFaultKind::jammed, none},
     {"runaway", drives, DeviceFaultKind::runaway, none, description::parse_angular_speed, true},
@@ -50,11 +64,19 @@ constexpr KindName kinds[] = {
     {"weak", drives, DeviceFaultKind::weak, none, description::parse_torque},
     {"offset", drives, DeviceFaultKind::offset, none, description::parse_angle, true},
     {"stuck", drives, DeviceFaultKind::stuck, none},
-    {"exception", modbus, DeviceFaultKind::modbus_exception, none},
-    {"busy", modbus, DeviceFaultKind::modbus_busy, none},
+    {"exception", modbus, DeviceFaultKind::modbus_exception, last_exception},
+    {"lost", modbus, DeviceFaultKind::modbus_lost, u16},
     {"closed", modbus, DeviceFaultKind::modbus_closed, none},
     {"wrong_unit", modbus, DeviceFaultKind::modbus_wrong_unit, none},
+    {"wrong_function", modbus, DeviceFaultKind::modbus_wrong_function, none},
+    {"wrong_count", modbus, DeviceFaultKind::modbus_wrong_count, none},
     {"half_answer", modbus, DeviceFaultKind::modbus_half, none},
+    {"low_first", modbus, DeviceFaultKind::modbus_low_first, none},
+    {"forgets", modbus, DeviceFaultKind::modbus_forgets, none},
+    {"no_function_23", modbus, DeviceFaultKind::modbus_no_function_23, none},
+    {"not_ready", modbus, DeviceFaultKind::modbus_not_ready, none},
+    {"not_driven", modbus, DeviceFaultKind::modbus_not_driven, none},
+    {"tripped", modbus, DeviceFaultKind::modbus_tripped, none},
     {"silent", sensor, DeviceFaultKind::sensor_silent, none},
     {"samples", sensor, DeviceFaultKind::samples_missing, none},
     {"frozen", sensor, DeviceFaultKind::frozen, none},
@@ -108,6 +130,18 @@ double parse_amount(const KindName& kind, std::string_view text) {
   return negative ? -amount : amount;
 }
 
+// OBJECT:CONTENT; what a refused one is aborted by may be left out.
+void parse_object(std::string_view all, std::string_view text, const KindName& kind, DeviceFault& fault) {
+  const std::size_t colon = text.find(':');
+  const bool holds = kind.kind == DeviceFaultKind::object_holds, refuses = kind.kind == DeviceFaultKind::value_refused;
+  if (colon == std::string_view::npos ? holds : !holds && !refuses) {
+    refuse(all, holds ? "OBJECT:VALUE after '=', such as 0x140002:255" : "one number after '='");
+  }
+  fault.value = parse_value(all, text.substr(0, colon), kind.most);
+  if (refuses) fault.content = refused_by_value;
+  if (colon != std::string_view::npos) fault.content = parse_value(all, text.substr(colon + 1), u32);
+}
+
 std::int64_t parse_time_ns(std::string_view text) {
   if (text == "0" || text == "0s") return 0;
   return std::llround(description::parse_duration(text, "--fault") * 1e9);
@@ -149,12 +183,13 @@ DeviceFault parse_device_fault(std::string_view text) {
   if (found->parse_amount != nullptr) {
     fault.amount = parse_amount(*found, what.substr(equals + 1));
   } else if (has_value) {
-    fault.value = parse_value(all, what.substr(equals + 1), found->most);
+    parse_object(all, what.substr(equals + 1), *found, fault);
   }
   if (at == std::string_view::npos) return fault;
-  constexpr DeviceFaultKind made_so[] = {DeviceFaultKind::device_type,  DeviceFaultKind::object_missing,
-                                         DeviceFaultKind::object_fixed, DeviceFaultKind::value_refused,
-                                         DeviceFaultKind::mode_late,    DeviceFaultKind::homed};
+  constexpr DeviceFaultKind made_so[] = {
+      DeviceFaultKind::device_type,  DeviceFaultKind::object_missing, DeviceFaultKind::object_fixed,
+      DeviceFaultKind::object_holds, DeviceFaultKind::value_refused,  DeviceFaultKind::bits_wanted,
+      DeviceFaultKind::mode_first,   DeviceFaultKind::mode_late,      DeviceFaultKind::homed};
   if (std::find(std::begin(made_so), std::end(made_so), fault.kind) != std::end(made_so))
     refuse(all, "no time: a device is what it is from the start");
   const std::size_t dots = times.find("..");

@@ -6,6 +6,7 @@
 //   axis_3:runaway=-0.5rad/s@2s       drive goes off by itself
 //   sensor:frozen@1.5s..1.6s          repeats one sample for a tenth of a second
 //   sensor:status=0x4000@3s
+//   axis_1:holds=0x140002:255         object 1400h:02 is 255
 // DEVICE is a joint's name in the cell, or "sensor". Times count from power on and have a unit.
 #pragma once
 
@@ -24,7 +25,10 @@ enum class DeviceFaultKind : std::uint8_t {
   device_type,     // "device_type": 1000h is VALUE; always, no times
   object_missing,  // "lacks": it has no object VALUE (index << 8 | sub-index); always, no times
   object_fixed,    // "fixed": object VALUE can't be written; always, no times
-  value_refused,   // "refuses": writing object VALUE is aborted by its value (0609 0030h); always, no times
+  object_holds,    // "holds": object VALUE has CONTENT from power on (OBJECT:CONTENT); always, no times
+  value_refused,   // "refuses": writing object VALUE is aborted by CONTENT (0609 0030h, its value); always, no times
+  bits_wanted,     // "wants_bits": says that it follows only while controlword bits VALUE are set; always, no times
+  mode_first,      // "mode_first": takes no mapping of PDOs until 6060h has a mode; always, no times
   mode_late,       // "mode_late": 6061h shows the mode only once operation is enabled; always, no times
   homed,           // "homed": with an incremental encoder, it was homed before; always, no times
   heartbeat_lost,  // "heartbeat": no heartbeat leaves
@@ -34,6 +38,15 @@ enum class DeviceFaultKind : std::uint8_t {
   bit_12_missing,  // "bit12": never says that it follows its targets
   mode_changed,    // "mode": 6061h shows mode VALUE
   twin,            // "twin": another node with the same number answers each SYNC, too
+  sdo_late,        // "sdo_late": answers SDO requests VALUE milliseconds later
+  sdo_stray,       // "sdo_stray": sends an answer for another object before each answer
+  sdo_sizeless,    // "sdo_sizeless": its read answers don't say how many bytes count
+  sdo_doubled,     // "sdo_doubled": sends each SDO answer twice
+  guarding,        // "guarding": its heartbeat's bit 7 toggles, as that of node guarding does
+  boot_up,         // "boot_up": says boot-up once, and carries on
+  warning,         // "warning": says EMCY code VALUE with no bit in its error register, and carries on
+  sync_lost,       // "sync_lost": misses one of VALUE SYNCs
+  tpdo_bytes,      // "tpdo_bytes": its transmit PDOs have VALUE bytes
   power_loss,      // "power": off, and on again at the end
   jammed,          // "jammed": the motor can't turn
   runaway,         // "runaway": goes off from its setpoints at AMOUNT rad/s
@@ -44,11 +57,19 @@ enum class DeviceFaultKind : std::uint8_t {
   stuck,           // "stuck": it reports one position whatever it does
   // Those that spoil a position's way (runaway) are no fault of a drive that takes torques.
   // Drives on a Modbus line, which know "silent", "power", "jammed" and what follows that as well
-  modbus_exception,   // "exception": each request is answered by exception 04
-  modbus_busy,        // "busy": each request is answered by exception 06
-  modbus_closed,      // "closed": the connection is closed
-  modbus_wrong_unit,  // "wrong_unit": its answers bear the next unit's number
-  modbus_half,        // "half_answer": its answers end in the middle
+  modbus_exception,       // "exception": each request is answered by exception VALUE
+  modbus_lost,            // "lost": one of VALUE requests has no answer
+  modbus_closed,          // "closed": the connection is closed
+  modbus_wrong_unit,      // "wrong_unit": its answers bear the next unit's number
+  modbus_wrong_function,  // "wrong_function": its answers bear another function's
+  modbus_wrong_count,     // "wrong_count": its answers say that they have a register less
+  modbus_half,            // "half_answer": its answers end in the middle
+  modbus_low_first,       // "low_first": its words are in the other order than its file says
+  modbus_forgets,         // "forgets": it acknowledges settings and doesn't keep them
+  modbus_no_function_23,  // "no_function_23": it doesn't know that function
+  modbus_not_ready,       // "not_ready": its status never says that it is ready
+  modbus_not_driven,      // "not_driven": its status never says that it is driven
+  modbus_tripped,         // "tripped": its status says that it has a fault
   // Sensor
   sensor_silent,    // "silent": answers nothing
   samples_missing,  // "samples": answers everything but polls
@@ -74,8 +95,9 @@ struct DeviceFault {
   std::string device;
   DeviceFaultKind kind = DeviceFaultKind::drive_silent;
   std::uint32_t value = 0;
-  double amount = 0.0;       // of a linear axis, read m for rad and N for Nm
-  std::int64_t from_ns = 0;  // since power on
+  std::uint32_t content = 0;  // of an object: its value, or the abort code
+  double amount = 0.0;        // of a linear axis, read m for rad and N for Nm
+  std::int64_t from_ns = 0;   // since power on
   std::int64_t until_ns = std::numeric_limits<std::int64_t>::max();
 };
 

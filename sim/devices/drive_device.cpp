@@ -296,7 +296,9 @@ std::uint16_t DriveDevice::statusword() const noexcept {
     if (homing_ == HomingState::failed) word |= 0x2000u;
     return static_cast<std::uint16_t>(word);
   }
-  if (following_ && !never_following_ && state_ == DriveState::operation_enabled) word |= 0x1000u;
+  const bool has_its_bits = (controlword_->number() & wanted_bits_) == wanted_bits_;
+  const bool says_following = following_ && has_its_bits && !never_following_;
+  if (says_following && state_ == DriveState::operation_enabled) word |= 0x1000u;
   if (following_error_since_ns_ != never) word |= 0x2000u;
   return static_cast<std::uint16_t>(word);
 }

@@ -86,6 +86,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   // 6060h says.
   void show_mode_late(bool late) noexcept { shows_mode_late_ = late; }
   void never_say_following(bool on) noexcept { never_following_ = on; }
+  // Says that it follows (bit 12) only while these bits of the controlword are set.
+  void want_controlword_bits(std::uint16_t bits) noexcept { wanted_bits_ = bits; }
   void show_mode(std::optional<std::int8_t> mode) noexcept { shown_mode_ = mode; }
   // 60FDh, of what is wired to it.
   void set_digital_inputs(std::uint32_t bits) noexcept { digital_inputs_->set(bits); }
@@ -162,6 +164,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   bool period_fixed_ = false;
   bool sto_open_ = false, shows_mode_late_ = false, never_following_ = false;
   std::optional<std::int8_t> shown_mode_;
+  std::uint16_t wanted_bits_ = 0;
   std::int64_t brake_open_ns_ = 0;
   bool stopping_ = false;  // on a ramp that ends in after_stop_
   DriveState after_stop_ = DriveState::switch_on_disabled;

@@ -31,9 +31,15 @@ ModbusDevice::ModbusDevice(const description::ModbusDriveDescription& registers,
   for (const description::ModbusSetting& setting : registers.settings) add(setting.at, setting.registers);
 }
 
-void ModbusDevice::set_fault(ModbusFault fault) noexcept {
+void ModbusDevice::set_fault(ModbusFault fault, std::uint32_t value) noexcept {
   const std::lock_guard lock(mutex_);
   fault_ = fault;
+  fault_value_ = value;
+}
+
+int ModbusDevice::late_ms() const noexcept {
+  const std::lock_guard lock(mutex_);
+  return fault_ == ModbusFault::late ? static_cast<int>(fault_value_) : 0;
 }
 
 ModbusFault ModbusDevice::fault() const noexcept {
@@ -57,17 +63,27 @@ std::vector<std::uint8_t> ModbusDevice::serve(std::span<const std::uint8_t> requ
   const std::lock_guard lock(mutex_);
   if (request.size() < 2) return {};
   if (fault_ == ModbusFault::silent || fault_ == ModbusFault::closed) return {};
-  if (fault_ == ModbusFault::exception) return exception(request, device_failure);
-  if (fault_ == ModbusFault::busy) return exception(request, device_busy);
+  if (fault_ == ModbusFault::lost && fault_value_ > 0 && ++requests_ % fault_value_ == 0) return {};
+  if (fault_ == ModbusFault::exception) return exception(request, static_cast<std::uint8_t>(fault_value_));
   std::vector<std::uint8_t> answer = answer_to(request);
   if (fault_ == ModbusFault::wrong_unit) ++answer[0];
+  if (fault_ == ModbusFault::wrong_function) ++answer[1];
+  if (fault_ == ModbusFault::wrong_count) answer[2] = static_cast<std::uint8_t>(answer[2] - 2);
   if (fault_ == ModbusFault::half) answer.resize(answer.size() / 2);
   return answer;
 }
 
+bool ModbusDevice::is_forgotten(unsigned at) const noexcept {
+  return fault_ == ModbusFault::forgets &&
+         std::any_of(registers_.settings.begin(), registers_.settings.end(), [at](const auto& setting) {
+           return at >= setting.at && at < setting.at + static_cast<unsigned>(setting.registers);
+         });
+}
+
 std::vector<std::uint8_t> ModbusDevice::answer_to(std::span<const std::uint8_t> request) {
   const unsigned function = request[1];
-  if (function != 3 && function != 16 && function != 23) return exception(request, illegal_function);
+  const bool known = function == 3 || function == 16 || (function == 23 && fault_ != ModbusFault::no_function_23);
+  if (!known) return exception(request, illegal_function);
   if (request.size() < 6) return exception(request, illegal_value);
   requested_ = true;
   const unsigned at = word(request, 2), count = word(request, 4);
@@ -110,7 +126,9 @@ bool ModbusDevice::store(unsigned at, unsigned count, std::span<const std::uint8
   for (unsigned i = at; i < at + count; ++i) {
     if (bank_.find(i) == bank_.end()) return false;
   }
-  for (unsigned i = 0; i < count; ++i) bank_[at + i] = static_cast<std::uint16_t>(word(bytes, 2 * i));
+  for (unsigned i = 0; i < count; ++i) {
+    if (!is_forgotten(at + i)) bank_[at + i] = static_cast<std::uint16_t>(word(bytes, 2 * i));
+  }
   return true;
 }
 
@@ -123,8 +141,8 @@ void ModbusDevice::note_command(unsigned at, unsigned count) noexcept {
 std::int64_t ModbusDevice::value_at(unsigned at, int registers) const noexcept {
   const auto get = [this](unsigned i) { return bank_.find(i)->second; };
   if (registers == 1) return static_cast<std::int16_t>(get(at));
-  const unsigned high = registers_.high_word_first ? get(at) : get(at + 1);
-  const unsigned low = registers_.high_word_first ? get(at + 1) : get(at);
+  const unsigned high = high_word_first() ? get(at) : get(at + 1);
+  const unsigned low = high_word_first() ? get(at + 1) : get(at);
   return static_cast<std::int32_t>(high << 16 | low);
 }
 
@@ -135,8 +153,8 @@ void ModbusDevice::put(unsigned at, int registers, std::int64_t value) noexcept 
     bank_.find(at)->second = low;
     return;
   }
-  bank_.find(at)->second = registers_.high_word_first ? high : low;
-  bank_.find(at + 1)->second = registers_.high_word_first ? low : high;
+  bank_.find(at)->second = high_word_first() ? high : low;
+  bank_.find(at + 1)->second = high_word_first() ? low : high;
 }
 
 // ---- the axis -------------------------------------------------------------------------------------------------------
@@ -190,9 +208,10 @@ void ModbusDevice::supervise(std::int64_t time_ns) noexcept {
 
 void ModbusDevice::publish() noexcept {
   put(registers_.position.at, registers_.position.registers, axis_.position_counts());
-  std::uint32_t status = registers_.ready_value;
-  if (enabled_ && !timed_out_) status |= registers_.enabled_value;
-  if (timed_out_) status |= registers_.fault_mask;
+  const bool is_ready = fault_ != ModbusFault::not_ready, says_driven = is_ready && fault_ != ModbusFault::not_driven;
+  std::uint32_t status = is_ready ? registers_.ready_value : 0;
+  if (enabled_ && !timed_out_ && says_driven) status |= registers_.enabled_value;
+  if (timed_out_ || fault_ == ModbusFault::tripped) status |= registers_.fault_mask;
   put(registers_.status.at, registers_.status.registers, status);
 }
 

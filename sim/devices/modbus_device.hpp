@@ -20,18 +20,27 @@
 namespace proxarm::sim {
 
 // Exception codes of a Modbus server.
-inline constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal_value = 3, device_failure = 4,
-                              device_busy = 6;
+inline constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal_value = 3;
 
 // What may be wrong with its answers.
 enum class ModbusFault : std::uint8_t {
   none,
-  exception,   // 04, server device failure
-  busy,        // 06, server device busy
-  silent,      // no answer
-  closed,      // the connection is closed
-  wrong_unit,  // the answer bears the next unit's number
-  half,        // the answer ends in its middle
+  exception,       // VALUE, such as 04, server device failure
+  silent,          // no answer
+  lost,            // one of VALUE requests has no answer
+  late,            // the answer comes VALUE milliseconds later; on a real line only
+  closed,          // the connection is closed
+  wrong_unit,      // the answer bears the next unit's number
+  wrong_function,  // the answer bears another function's
+  wrong_count,     // the answer says that it has a register less than it has
+  half,            // the answer ends in its middle
+  low_word_first,  // values in two registers have their words in the other order than the file says
+  forgets,         // settings are acknowledged and not kept
+  no_function_23,  // that function is answered by exception 01
+  not_ready,       // the status never says that it is ready, nor that it is driven
+  not_driven,      // the status never says that it is driven
+  tripped,         // the status says that it has a fault
+  echo,            // RTU: its adapter echoes each request before the answer
 };
 
 // What answers on a Modbus line.
@@ -46,6 +55,7 @@ class ModbusUnit {
   // Unit and PDU of a request to this unit; the answer's, empty where there is none.
   [[nodiscard]] virtual std::vector<std::uint8_t> serve(std::span<const std::uint8_t> request) = 0;
   [[nodiscard]] virtual ModbusFault fault() const noexcept = 0;
+  [[nodiscard]] virtual int late_ms() const noexcept { return 0; }
 };
 
 class ModbusDevice final : public ModbusUnit {
@@ -58,12 +68,17 @@ class ModbusDevice final : public ModbusUnit {
   [[nodiscard]] std::vector<std::uint8_t> serve(std::span<const std::uint8_t> request) override;
   void on_time(std::int64_t time_ns) noexcept;
 
-  void set_fault(ModbusFault fault) noexcept;
+  void set_fault(ModbusFault fault, std::uint32_t value = 0) noexcept;
   [[nodiscard]] ModbusFault fault() const noexcept override;
+  [[nodiscard]] int late_ms() const noexcept override;
   [[nodiscard]] std::uint16_t register_at(std::uint16_t at) const;
   [[nodiscard]] bool timed_out() const noexcept;
 
  private:
+  [[nodiscard]] bool high_word_first() const noexcept {
+    return registers_.high_word_first != (fault_ == ModbusFault::low_word_first);
+  }
+  [[nodiscard]] bool is_forgotten(unsigned at) const noexcept;
   [[nodiscard]] std::vector<std::uint8_t> answer_to(std::span<const std::uint8_t> request);
   [[nodiscard]] bool read_into(std::vector<std::uint8_t>& answer, unsigned at, unsigned count) const;
   [[nodiscard]] bool store(unsigned at, unsigned count, std::span<const std::uint8_t> bytes);
@@ -81,6 +96,7 @@ class ModbusDevice final : public ModbusUnit {
   mutable std::mutex mutex_;
   std::unordered_map<unsigned, std::uint16_t> bank_;  // the registers that there are
   ModbusFault fault_ = ModbusFault::none;
+  std::uint32_t fault_value_ = 0, requests_ = 0;
   bool commanded_ = false, requested_ = false, enabled_ = false, timed_out_ = false;
   std::int64_t last_request_ns_ = 0;
 };

@@ -124,6 +124,7 @@ bool ModbusServer::serve_connection(int connection) noexcept {
     if (device->fault() == ModbusFault::closed) return false;
     const Bytes answer = device->serve(request);
     if (answer.empty()) return true;
+    usleep(1000U * static_cast<unsigned>(device->late_ms()));
     Bytes reply(header.begin(), header.end());
     // Half an answer announces the whole.
     const std::size_t announced = device->fault() == ModbusFault::half ? 2 * answer.size() : answer.size();
@@ -179,11 +180,13 @@ void ModbusServer::serve_terminal() noexcept {
     Bytes request(received.begin(), received.begin() + static_cast<std::ptrdiff_t>(size));
     received.clear();
     if (crc16(request) != 0) continue;  // over a message with its checksum
-    request.resize(size - 2);
     for (ModbusUnit* device : devices_) {
       if (device->unit() != request[0]) continue;
+      if (device->fault() == ModbusFault::echo && write(terminal_fd_, request.data(), size) < 0) break;
+      request.resize(size - 2);
       Bytes answer = device->serve(request);
       if (answer.empty()) break;
+      usleep(1000U * static_cast<unsigned>(device->late_ms()));
       const std::uint16_t crc = crc16(answer);
       answer.push_back(static_cast<std::uint8_t>(crc));
       answer.push_back(static_cast<std::uint8_t>(crc >> 8));

@@ -45,7 +45,7 @@ class DriveBehaviour(ProgramTest):
         self.assertEqual(fault["fault"], "drive_not_enabled")
         self.assertIn("bit 12", fault["text"])
         self.changed("models/cells/bench.yaml",
-                     ("    device_type: 0x00020192\n", "    enable_timeout_s: 12\n"))
+                     ("    device_type: 0x00020192\n", "    bring_up: {enable_timeout_s: 12}\n"))
         # The cell's own hand would be on its way by then.
         rests = self.written("rests.yaml", "name: at rest\nmass_kg: 1.0\nstiffness_N_per_m: 500\ndamping_Ns_per_m: 20\n"
                                            "waypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0]}\n")
@@ -55,7 +55,7 @@ class DriveBehaviour(ProgramTest):
         late = ("--no-plot", "--duration", "0.2s", "--timestep", "2ms", "--fault", "shoulder:mode_late")
         cell = self.of_shoulder(DISPLAY)
         self.assert_refused(self.call("run", cell, *late), "6061h:00 modes of operation display", "found 0x00 (0)")
-        self.changed("models/cells/bench.yaml", (DISPLAY, DISPLAY + "    mode_shown: enabled\n"))
+        self.changed("models/cells/bench.yaml", (DISPLAY, DISPLAY + "    bring_up: {mode_shown: enabled}\n"))
         self.assertEqual(self.summary(cell, *late)["faults"], [])
         fault = self.run_to_fault(cell, "--timestep", "2ms", "--fault", "shoulder:mode_late", "--fault",
                                   "shoulder:mode=3")

@@ -54,7 +54,7 @@ class Session:
     def __init__(self, folder):
         with two.Process("chrt", "-f", 70, two.PROGRAM, "sim", "--bus", BUS), \
                 two.Process("candump", "-L", "-d", "-r", 30_000_000, WITNESSED) as witness:
-            time.sleep(0.3)
+            time.sleep(0.7)  # it listens first
             before, begun = transmitted(), time.monotonic()
             floods = [subprocess.Popen(["cangen", BUS, "-g", "0", "-L", "8", *flood]) for flood in FLOODS]
             with two.controller(BUS, "2s", folder) as run:

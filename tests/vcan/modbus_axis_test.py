@@ -7,7 +7,6 @@ import re
 import socket
 import subprocess
 import threading
-import time
 from pathlib import Path
 
 import two_processes as two
@@ -22,8 +21,7 @@ class ModbusAxis(two.VcanTestCase):
         subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
 
     def run_both(self, *faults, far_end=CELL, cell=CELL, options=()):
-        with two.Process(two.PROGRAM, "sim", far_end, "--bus", BUSES, *faults) as arm:
-            time.sleep(0.3)
+        with two.simulated_arm(BUSES, far_end, *faults) as arm:
             with two.Process(two.PROGRAM, "run", cell, "--bus", BUSES, "--duration", "2s", "--json",
                              "--no-plot", *options) as run:
                 status, output, errors = run.wait(), run.output(), run.errors()
@@ -44,6 +42,20 @@ class OnThisMachine(ModbusAxis):
         self.assertEqual(status, 1, errors)
         self.assertEqual([fault["fault"] for fault in summary["faults"]], ["modbus_silent"])
         self.assertIn("Modbus connection was closed", summary["faults"][0]["text"])
+
+
+    def test_a_first_position_that_does_not_show_the_order_of_its_words_is_refused(self):
+        """The rail starts at 0, which is 0 in either order; on a line only somebody who has tried it knows."""
+        text = re.sub(r"(:\s*)(\.\./[\w./]+)", lambda m: m[1] + str((CELL.parent / m[2]).resolve()), CELL.read_text())
+        untried = self.folder / "untried.yaml"
+        untried.write_text(re.sub(r" +word_order_tried: .*\n", "", text))
+        with two.simulated_arm(BUSES, CELL) as arm:
+            done = subprocess.run([two.PROGRAM, "run", untried, "--bus", BUSES, "--duration", "1s"], capture_output=True,
+                                  text=True, timeout=60)
+            self.assertEqual(arm.stop(), 0, arm.errors())
+        self.assertEqual(done.returncode, 2, done.stdout + done.stderr)
+        self.assertIn("word_order_tried", done.stderr)
+        self.assertIn("rail", done.stderr)
 
 
 NETWORK_ADDRESS = "10.77.0.1"

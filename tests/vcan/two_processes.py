@@ -156,7 +156,12 @@ def thread_states(process):
 
 
 def simulated_arm(bus, *options):
+    """It listens first, and says when it has begun."""
     process = Process(PROGRAM, "sim", "--bus", bus, *options)
+    for _ in range(100):
+        if process.process.poll() is not None or "on the wire" in process.errors():
+            break
+        time.sleep(0.01)
     time.sleep(0.2)
     return process
 

@@ -57,6 +57,7 @@ Outcome run(proof::BusLossSession& session, fieldbus::CanNetwork& network, doubl
     t_k_ns += (late_ns / period_ns + 1) * period_ns;
     if (late_ns > 10 * period_ns && !session.silent()) session.request_stop();
   }
+  session.ask_the_others();
   session.shut_down();
   return {session.own_stops(), session.fault(), false};
 }

@@ -51,6 +51,21 @@ void add_heartbeat(PlannedBus& bus, const PreparedSession& session) {
   bus.frames.push_back(heartbeat);
 }
 
+// Life guarding: a request without data and its answer, as often as the heartbeat and behind it.
+void add_guarding(PlannedBus& bus, const PlannedFrame& heartbeat, const description::DriveDescription& drive) {
+  if (drive.bring_up.stops_by != description::StopsBy::life_guarding) return;
+  PlannedFrame frame = heartbeat;
+  frame.id = fieldbus::heartbeat_id(drive.node);
+  frame.name = "guard request to " + drive.joint;
+  frame.shape.bytes = 0;
+  bus.frames.push_back(frame);
+  frame.after = frame.name;
+  frame.name = "guard answer of " + drive.joint;
+  frame.shape.bytes = 1;
+  frame.sender = drive.joint;
+  bus.frames.push_back(frame);
+}
+
 // What frames usually hold: drives enabled and within 0.2 rad of the start pose, a hand that pushes with 10 N and 1 Nm.
 constexpr int typical_samples = 256;
 constexpr double typical_motion_rad = 0.2, typical_force_N = 10.0, typical_torque_Nm = 1.0;
@@ -293,7 +308,14 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
     }
   }
   const bool drives = std::any_of(bus.frames.begin(), bus.frames.end(), [](const PlannedFrame& f) { return f.sync; });
-  if (drives) add_heartbeat(bus, session);
+  if (!drives) return bus;
+  add_heartbeat(bus, session);
+  const PlannedFrame heartbeat = bus.frames.back();
+  for (const description::DriveDescription& drive : session.cell.drives) {
+    for (std::size_t i = 0; i < session.cell.buses.size(); ++i) {
+      if (indices[i] == index && session.cell.buses[i].name == drive.bus) add_guarding(bus, heartbeat, drive);
+    }
+  }
   return bus;
 }
 

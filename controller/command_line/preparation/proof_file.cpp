@@ -25,7 +25,7 @@ void add_file(scenes::Sha256& hash, const fs::path& file) {
   hash.add(std::as_bytes(std::span(bytes)));
 }
 
-[[noreturn]] void refuse_proof(const fs::path& file, const char* found) {
+[[noreturn]] void refuse_proof(const fs::path& file, const std::string& found) {
   throw description::SetupError(
       {.file = file.string(), .found = found, .expected = "a proof of this cell on a real arm", .advice = how});
 }
@@ -119,6 +119,12 @@ void require_proof(const PreparedSession& session) {
   if (proof.cell_sha256 != cell_sha256(session))
     refuse_proof(file, "a proof of another cell, or of this one before it, its URDF or its sensor's file was changed");
   if (!proof.whole) refuse_proof(file, "a proof of what drives do without the controller, and of nothing else");
+  for (const description::DriveDescription& drive : session.cell.drives) {
+    if (drive.bring_up.stops_by != description::StopsBy::heartbeat && proof.bus_loss.empty()) {
+      refuse_proof(file, "a proof without --bus-loss, though the drive of " + drive.joint +
+                             " isn't stopped by the heartbeat (bring_up: stops_by)");
+    }
+  }
 }
 
 }  // namespace proxarm::command_line

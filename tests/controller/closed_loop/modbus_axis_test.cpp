@@ -124,14 +124,18 @@ TEST_P(ModbusLineFaults, StopAllAxes) {
 INSTANTIATE_TEST_SUITE_P(
     Faults, ModbusLineFaults,
     ::testing::Values(
-        LineFault{"exception", Fault::drive_fault, fieldbus::DriveFault::modbus_exception, 8, "server device failure"},
+        LineFault{"exception=4", Fault::drive_fault, fieldbus::DriveFault::modbus_exception, 8,
+                  "server device failure"},
         LineFault{"closed", Fault::modbus_silent, fieldbus::DriveFault::modbus_closed, 8, "connection was closed"},
         LineFault{"wrong_unit", Fault::drive_fault, fieldbus::DriveFault::modbus_wrong_unit, 8, "another unit"},
         LineFault{"silent", Fault::modbus_silent, fieldbus::DriveFault::modbus_timeout, 70,
                   "no complete Modbus answer in time"},
         LineFault{"half_answer", Fault::modbus_silent, fieldbus::DriveFault::modbus_timeout, 70,
                   "no complete Modbus answer in time"}),
-    [](const auto& fault) { return std::string(fault.param.script); });
+    [](const auto& fault) {
+      const std::string script = fault.param.script;
+      return script.substr(0, script.find('='));
+    });
 
 }  // namespace
 }  // namespace proxarm::controller

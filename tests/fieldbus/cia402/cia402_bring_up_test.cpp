@@ -37,6 +37,7 @@ struct Cia402BringUpTest : ::testing::Test {
   DriveSettings settings;
   std::vector<ServoDrive> drives;
   std::vector<DriveSlot> slots;
+  description::BringUp of_third;
 
   Cia402BringUpTest() {
     network.bus(0).on_send = [this](const CanFrame& frame) {
@@ -46,9 +47,10 @@ struct Cia402BringUpTest : ::testing::Test {
     network.bus(1).on_send = [this](const CanFrame& frame) { three.on_frame(frame); };
   }
   std::vector<DriveIdentity> bring_up(const FrameHandler& other = {}, const Tell& tell = {}) {
+    description::DriveDescription third = describe_drive("axis_3", "axes_3", 3);
+    third.bring_up = of_third;
     drives = {ServoDrive(describe_drive("axis_1", "axes_1_2", 1), settings),
-              ServoDrive(describe_drive("axis_2", "axes_1_2", 2), settings),
-              ServoDrive(describe_drive("axis_3", "axes_3", 3), settings)};
+              ServoDrive(describe_drive("axis_2", "axes_1_2", 2), settings), ServoDrive(third, settings)};
     slots = {{&drives[0], 0}, {&drives[1], 0}, {&drives[2], 1}};
     return bring_up_drives(network, slots, other, tell);
   }
@@ -62,6 +64,9 @@ struct Cia402BringUpTest : ::testing::Test {
     (void)bring_up({}, [&told](const std::string& line) { told.push_back(line); });
     for (const DriveSlot& slot : slots) EXPECT_EQ(slot.drive->nmt_state(), NmtState::operational);
     return told;
+  }
+  void forget_sent() {
+    for (const auto& bus : network.buses) bus->sent.clear();
   }
   // The message of a failed bring-up; no drive may have been started.
   std::string refusal() {
@@ -292,8 +297,7 @@ TEST_F(Cia402BringUpTest, A6007hThatRefusesTheValueIsTakenUnlessItDoesNothing) {
   three.write_aborts = {{{0x6007, 0}, 0x06090030}};
   EXPECT_NO_THROW(bring_up());
   has(drives[2].losses().front(), "how it stops without the controller is its own affair");
-  network.bus(0).sent.clear();
-  network.bus(1).sent.clear();
+  forget_sent();
   three.objects[{0x6007, 0}].value = 0;
   has(refusal(),
       "object 6007h:00 abort connection option code (quick stop): drive of axis_3: found 0x0000 (0), which "
@@ -301,17 +305,97 @@ TEST_F(Cia402BringUpTest, A6007hThatRefusesTheValueIsTakenUnlessItDoesNothing) {
 }
 
 TEST_F(Cia402BringUpTest, AnObjectThatIsNeededMustTakeItsValue) {
-  for (const TableNode::Key& key : {TableNode::Key{0x1016, 1}, {0x6060, 0}, {0x60C2, 1}}) {
+  three.write_aborts = {{{0x1016, 1}, 0x06090030}};
+  has(refusal(), "SDO abort 06090030: invalid value for parameter");
+  for (const TableNode::Key& key : {TableNode::Key{0x6060, 0}, {0x60C2, 1}}) {
     three.write_aborts = {{key, 0x06090030}};
-    has(refusal(), "SDO abort 06090030: invalid value for parameter");
+    three.objects = TableNode::servo_drive();
+    three.objects[key].value = 3;
+    has(refusal(), "found 0x03 (3), which can't be written (SDO abort 06090030: invalid value for parameter");
   }
+}
+
+// What a cell says of a drive in `bring_up`.
+class WithBringUp : public Cia402BringUpTest {
+ protected:
+  // The first write of an object, among all writes to the third drive; −1: never.
+  [[nodiscard]] std::ptrdiff_t place_of(TableNode::Key key) const {
+    const auto found = std::find(three.written.begin(), three.written.end(), key);
+    return found == three.written.end() ? -1 : found - three.written.begin();
+  }
+};
+
+TEST_F(WithBringUp, SkippedObjectsAreNotTouchedAndTold) {
+  of_third.skip = {0x102901, 0x605A00};
+  EXPECT_NO_THROW(bring_up());
+  EXPECT_EQ(place_of({0x1029, 1}), -1);
+  EXPECT_EQ(place_of({0x605A, 0}), -1);
+  EXPECT_GE(place_of({0x605B, 0}), 0);
+  has(drives[2].losses().front(), "1029h:01 isn't touched (bring_up: skip)");
+  of_third.skip = {0x101601};
+  EXPECT_THROW(bring_up(), SetupError) << "a must";
+  of_third.skip = {0x230000};
+  EXPECT_THROW(bring_up(), SetupError) << "never touched";
+}
+
+TEST_F(WithBringUp, WhatIsWrittenFirstComesBeforeTheMapping) {
+  three.objects[{0x2300, 0}] = {2, 0};
+  of_third.write = {{0x606000, 8, 8}, {0x230000, 16, 0xFFFE}};
+  EXPECT_NO_THROW(bring_up());
+  EXPECT_GE(place_of({0x6060, 0}), 0);
+  EXPECT_LT(place_of({0x6060, 0}), place_of({0x2300, 0}));
+  EXPECT_LT(place_of({0x2300, 0}), place_of({0x1600, 1}));
+  EXPECT_EQ((three.objects[{0x2300, 0}].value), 0xFFFEU);
+}
+
+TEST_F(WithBringUp, ADriveThatIsStoppedByItsSetpointTimerMustHaveIt) {
+  of_third.stops_by = description::StopsBy::setpoint_timer;
+  EXPECT_NO_THROW(bring_up());
+  EXPECT_EQ(place_of({0x1016, 1}), -1);
+  EXPECT_GE(place_of({0x1400, 5}), 0);
+  three.aborts[{0x1400, 5}] = 0x06090011;
+  forget_sent();
+  has(refusal(), "object 1400h:05 RPDO event timer (timeout)");
+}
+
+// CiA 301, 7.2.8.3.2.1: life time = guard time (100Ch, ms) × factor (100Dh).
+TEST_F(WithBringUp, ADriveThatGuardsItsLifeIsToldForHowLong) {
+  three.objects.erase({0x1016, 1});
+  three.objects[{0x100C, 0}] = {2, 7};
+  three.objects[{0x100D, 0}] = {1, 0};
+  of_third.stops_by = description::StopsBy::life_guarding;
+  EXPECT_NO_THROW(bring_up());
+  EXPECT_EQ((three.objects[{0x100C, 0}].value), 20U);
+  EXPECT_EQ((three.objects[{0x100D, 0}].value), 3U);
+  CanFrame request;
+  ASSERT_TRUE(drives[2].guard_request(request));
+  EXPECT_EQ(request.id, 0x703U);
+  EXPECT_TRUE(request.remote);
+  EXPECT_FALSE(drives[0].guard_request(request));
+  three.objects.erase({0x100C, 0});
+  forget_sent();
+  has(refusal(), "object 100Ch:00 guard time (of the controller)");
+}
+
+// CiA 301: types 0 to 240 act at SYNC, 254 and 255 when the PDO comes.
+TEST_F(Cia402BringUpTest, AnRpdoThatIsEventDrivenForGoodIsTakenAndTold) {
+  for (const std::uint32_t type : {254U, 255U}) {
+    three.objects[{0x1400, 2}].value = type;
+    three.write_aborts = {{{0x1400, 2}, 0x06010002}};
+    EXPECT_NO_THROW(bring_up());
+    has(drives[2].losses().front(), "1400h:02 is " + std::string(type == 254 ? "0xFE (254)" : "0xFF (255)"));
+    has(drives[2].losses().front(), "acts as soon as it comes");
+  }
+  three.write_aborts = {{{0x1800, 2}, 0x06010002}};
+  three.objects[{0x1800, 2}].value = 255;
+  forget_sent();
+  has(refusal(), "object 1800h:02 TPDO transmission type: drive of axis_3: found 0xFF (255), which can't be written");
 }
 
 TEST_F(Cia402BringUpTest, A60C2hThatCantBeWrittenIsTakenWhereItFits) {
   three.write_aborts = {{{0x60C2, 2}, 0x06010002}};
   EXPECT_NO_THROW(bring_up());
-  network.bus(0).sent.clear();
-  network.bus(1).sent.clear();
+  forget_sent();
   three.objects[{0x60C2, 2}].value = 0xFC;
   has(refusal(), "object 60C2h:02 interpolation time index: drive of axis_3: found 0xFC (252), which can't be written");
 }

@@ -108,7 +108,7 @@ TEST(EdsCheck, RefusesADriveThatCantBeLed) {
               HasSubstr("[607A] DataType: found 16 bits, expected 32 bits"));
   EXPECT_THAT(refusal("ParameterName=Modes of operation\nObjectType=0x7\nDataType=0x0002\nAccessType=rw",
                       "ParameterName=Modes of operation\nObjectType=0x7\nDataType=0x0002\nAccessType=ro"),
-              HasSubstr("[6060] AccessType: found ro"));
+              HasSubstr("[6060] DefaultValue: found 0x00, which can't be written, expected 0x08"));
   EXPECT_THAT(refusal("ParameterName=Modes of operation\nObjectType=0x7\nDataType=0x0002\nAccessType=rw",
                       "ParameterName=Modes of operation\nObjectType=0x7\nDataType=0x0002\nAccessType=some"),
               AllOf(HasSubstr("[6060] AccessType: found \"some\""), HasSubstr("wanted: modes of operation")));

@@ -61,8 +61,9 @@ class ModbusLines : public ::testing::TestWithParam<bool> {
     line.parity = "none";  // a pseudo-terminal has none
     return line;
   }
-  std::unique_ptr<fieldbus::ModbusClient> client(double timeout_s) const {
+  std::unique_ptr<fieldbus::ModbusClient> client(double timeout_s, bool echo = false) const {
     description::ModbusLineDescription line = served();
+    line.echo = echo;
     line.port = server.port();
     line.device = server.device();
     return fieldbus::open_modbus(line, timeout_s);
@@ -95,7 +96,7 @@ TEST_P(ModbusLines, TellExceptionsApart) {
   std::array<std::uint16_t, 3> read{};
   EXPECT_EQ(master->read(1, 1000, read), ModbusResult::exception);
   EXPECT_EQ(master->exception(), 2);  // illegal data address
-  device.set_fault(ModbusFault::exception);
+  device.set_fault(ModbusFault::exception, 4);
   EXPECT_EQ(master->read(1, 16, read), ModbusResult::exception);
   EXPECT_EQ(master->exception(), 4);  // server device failure
   device.set_fault(ModbusFault::none);
@@ -119,6 +120,81 @@ TEST_P(ModbusLines, NameAnotherUnitsAnswer) {
   std::array<std::uint16_t, 3> read{};
   device.set_fault(ModbusFault::wrong_unit);
   EXPECT_EQ(master->read(1, 16, read), ModbusResult::wrong_unit);
+}
+
+struct BadAnswer {
+  const char* name;
+  ModbusFault fault;
+  std::uint32_t value;
+  ModbusResult expected;
+};
+// By the specification, V1.1b3: the function is repeated (4.2), a read's byte count is twice its registers (6.3). An
+// answer that comes after the response timeout is none.
+constexpr BadAnswer bad_answers[] = {
+    {"another function", ModbusFault::wrong_function, 0, ModbusResult::malformed},
+    {"a register less than asked for", ModbusFault::wrong_count, 0, ModbusResult::malformed},
+    {"another unit", ModbusFault::wrong_unit, 0, ModbusResult::wrong_unit},
+    {"half", ModbusFault::half, 0, ModbusResult::timeout},
+    {"none", ModbusFault::silent, 0, ModbusResult::timeout},
+    {"one that is late", ModbusFault::late, 150, ModbusResult::timeout},
+    {"one request of one lost", ModbusFault::lost, 1, ModbusResult::timeout},
+    {"gateway path unavailable", ModbusFault::exception, 10, ModbusResult::exception},
+};
+
+TEST_P(ModbusLines, JudgeAnswersAsTheSpecificationDoes) {
+  for (const BadAnswer& bad : bad_answers) {
+    SCOPED_TRACE(bad.name);
+    const auto master = client(impatience_s);
+    std::array<std::uint16_t, 3> read{};
+    device.set_fault(bad.fault, bad.value);
+    const ModbusResult result = master->read(1, 16, read);
+    device.set_fault(ModbusFault::none);
+    // A register more or less shifts what a serial line takes for the checksum, so the answer has no end there.
+    const bool has_no_end =
+        GetParam() && (bad.fault == ModbusFault::wrong_count || bad.fault == ModbusFault::wrong_function);
+    if (has_no_end) {
+      EXPECT_NE(result, ModbusResult::ok);
+    } else {
+      EXPECT_EQ(result, bad.expected);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));  // what is late comes now
+  }
+}
+
+TEST_P(ModbusLines, NeverTakeALateAnswerForThatOfAnotherRequest) {
+  const auto master = client(impatience_s);
+  std::array<std::uint16_t, 3> position{};
+  std::array<std::uint16_t, 1> timeout{60};
+  ASSERT_EQ(master->write(1, 32, timeout), ModbusResult::ok);
+  device.set_fault(ModbusFault::late, 80);
+  EXPECT_EQ(master->read(1, 16, position), ModbusResult::timeout);
+  device.set_fault(ModbusFault::none);
+  // Asked on and on while the late answer comes in.
+  int answered = 0;
+  for (int i = 0; i < 20; ++i) {
+    timeout[0] = 0;
+    if (master->read(1, 32, timeout) != ModbusResult::ok) continue;
+    ++answered;
+    EXPECT_EQ(timeout[0], 60);
+  }
+  EXPECT_GT(answered, 0) << "it recovers";
+}
+
+TEST_P(ModbusLines, SwallowTheEchoOfAnAdapterThatHearsItself) {
+  if (!GetParam()) return;  // TCP has none
+  device.set_fault(ModbusFault::echo);
+  std::array<std::uint16_t, 3> read{};
+  const std::array<std::uint16_t, 1> timeout{60};
+  const auto told = client(patience_s, true);
+  EXPECT_EQ(told->read(1, 16, read), ModbusResult::ok);
+  EXPECT_EQ(told->write(1, 32, timeout), ModbusResult::ok);
+  EXPECT_EQ(told->read(1, 16, read), ModbusResult::ok);
+  EXPECT_THAT(read, ElementsAre(1, 0xFFFE, 0xEE90));
+  const auto untold = client(impatience_s);
+  EXPECT_NE(untold->read(1, 16, read), ModbusResult::ok);
+  device.set_fault(ModbusFault::none);
+  const auto wrongly_told = client(impatience_s, true);
+  EXPECT_NE(wrongly_told->read(1, 16, read), ModbusResult::ok);
 }
 
 INSTANTIATE_TEST_SUITE_P(Wires, ModbusLines, ::testing::Bool(),
