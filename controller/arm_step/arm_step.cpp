@@ -322,7 +322,7 @@ bool ArmStep::cut(const Vec3& q_W, const Vec3& q_k1_W, LimitPlane<3>& out) noexc
   const auto wanted_for = [&](const Vec3& from_T_W) { return q_W + from_T_W - here_W + wrist_.J_W * model_.u; };
   Vec3 wanted = wanted_for(wrist_wanted_W_) - wrist_.by_turning_W * turn_from(model_, aim_);
   if (can_carry_wrist(wanted)) return false;
-  if (!start_.held || catches_up_) {
+  if (!start_.held) {
     wanted = wanted_for(wrist_.from_T_W);
     if (can_carry_wrist(wanted)) return false;
   }
