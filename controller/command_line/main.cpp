@@ -55,6 +55,11 @@ void add_fault_option(CLI::App& app, RunOptions& options) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
+void add_without_enabling(CLI::App& app, RunOptions& options) {
+  app.add_flag("--without-enabling-input", options.settings.without_enabling_input,
+               "leave out the cell's enabling input; needed on real interfaces for a cell that has none");
+}
+
 void add_enabling_option(CLI::App& app, RunOptions& options) {
   app.add_option("--enabling", CLI::callback_t([&](const CLI::results_t& words) {
                    for (const std::string& word : words) options.enabling.push_back(sim::parse_pressed_span(word));
@@ -100,8 +105,7 @@ void add_supervision_options(CLI::App& app, RunOptions& options) {
          "start with a force of up to this on the handle while the sensor is tared (default: it may vary by 5 N, "
          "and its mean by the cell's sensor.zero_drift_N); its mean is taken as zero")
       ->type_name("N");
-  app.add_flag("--without-enabling-input", options.settings.without_enabling_input,
-               "leave out the cell's enabling input; needed on real interfaces for a cell that has none");
+  add_without_enabling(app, options);
   add_hardware_option(app, options);
   app.add_flag("--without-proof", options.without_proof,
                "real drives of a cell that `proxarm prove` hasn't proven on them");
@@ -351,6 +355,7 @@ void add_prove_options(CLI::App& app, command_line::ProveOptions& options) {
                   "--extra-delay", "--lookahead"});
   add_fault_option(app, options.run);
   add_enabling_option(app, options.run);
+  add_without_enabling(app, options.run);
   add_hardware_option(app, options.run);
   add_arm_option(app, options.arm);
   app.add_flag(
@@ -370,6 +375,7 @@ void add_identify_options(CLI::App& app, command_line::IdentifyOptions& options)
       ->type_name("FILE");
   add_fault_option(app, options.run);
   add_enabling_option(app, options.run);
+  add_without_enabling(app, options.run);
   add_hardware_option(app, options.run);
   add_arm_option(app, options.arm);
   app.add_flag("--joints", options.joints,
@@ -498,6 +504,7 @@ class Commands {
                     "turning_damping=0.5, turning_spring=20: of a tool that turns, in Nms/rad and Nm/rad\n"
                     "tool_mass=0.75kg, tool_centre_m=X,Y,Z: of the tool behind the sensor, which the cell has wrong; "
                     "the centre of mass in metres from the sensor\n"
+                    "lookahead=4ms or auto: of a session that was started with one\n"
                     "timestep=2ms: the arm stops for it, and goes on\n"
                     "OBJECT.friction=0.6: of an object, by its name in the scene\n"
                     "OBJECT.position_m=X,Y,Z: of an object with motion: {driven: true}, in metres from where the scene "

@@ -372,10 +372,10 @@ class NewCell {
     const double damping_Ns_per_m = cell_.default_damping_Ns_per_m;
     const std::string damped =
         damping_Ns_per_m > 0.0 ? " with " + description::rounded_text(damping_Ns_per_m) + " Ns/m" : "";
-    std::printf("%s: a cell of %zu axes, sensor on %s, %zu %s, T = %.4g ms, %.3g kg%s\n", file_.c_str(),
-                cell_.drives.size(), cell_.sensor.link.c_str(), cell_.buses.size(),
-                cell_.buses.size() == 1 ? "bus" : "buses", 1e3 * cell_.default_period_s, cell_.default_mass_kg,
-                damped.c_str());
+    std::printf("%s: a cell of %zu %s, sensor on %s, %zu %s, T = %.4g ms, %.3g kg%s\n", file_.c_str(),
+                cell_.drives.size(), cell_.drives.size() == 1 ? "axis" : "axes", cell_.sensor.link.c_str(),
+                cell_.buses.size(), cell_.buses.size() == 1 ? "bus" : "buses", 1e3 * cell_.default_period_s,
+                cell_.default_mass_kg, damped.c_str());
     std::printf("the tool starts at x %.4f, y %.4f, z %.4f m\ntried on the simulated arm: %s\n", start_W_.x(),
                 start_W_.y(), start_W_.z(), advice_.c_str());
     for (const std::string& remark : source_.remarks) std::printf("  - %s\n", remark.c_str());
