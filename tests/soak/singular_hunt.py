@@ -6,7 +6,8 @@ feel it?
 
 The ways are found with kinematics of the judge's own: straight ones from the start, along which the fifth joint of six,
 or the sixth of seven, goes through zero or comes nearer to it than 0.05 rad. The hand leads along each, past the
-singularity and back, at 0.05 to 0.4 m/s. Judged by the records alone, while the joint is within 0.1 rad of zero:
+singularity and back, at 0.05 to 0.24 m/s, which is 0.45 m/s in the middle: a faster hand pulls at the tool's speed limit,
+singular or not. Judged by the records alone, while the joint is within 0.1 rad of zero:
   place        the tool is within 0.5 mm of the proxy's way, beside what the hand's force bends the gears by: in
                proportion to the force, as elsewhere on the way
   no stop      no fault; nor does the tool stand while the hand pulls with more than 5 N for 0.2 s
@@ -98,7 +99,7 @@ class Arm:
 
 
 def made_hand(chance, way, far_m):
-    speed = math.exp(chance.uniform(math.log(0.05), math.log(0.4)))
+    speed = math.exp(chance.uniform(math.log(0.05), math.log(0.24)))
     reach = far_m + PAST_M
     ends_s = 0.5 + reach / speed
     lines = ["name: through the wrist", "mass_kg: 1", f"stiffness_N_per_m: {chance.uniform(300, 1500):.4g}",
