@@ -107,8 +107,11 @@ bool PlaceMargin::surely_clear(const Columns& J) const noexcept {
 void PlaceMargin::go_to(const JointVector& c_rad, const models::ToolKinematics& at) noexcept {
   if (apart_) {
     const Columns J = wrist(at).J_W;
-    near_ = 0;
-    if (!surely_clear(J)) measure(c_rad, J);
+    if (surely_clear(J)) {
+      near_ = 0;
+    } else {
+      measure(c_rad, J);
+    }
     return;
   }
   const double moved = weights_.dot((c_rad - from_rad_).cwiseAbs());

@@ -69,7 +69,7 @@ const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOpti
         "the laws of its objects, tried with a point; whether its tool fits is told by `proxarm check CELL --scene`\n",
         stdout);
   }
-  // How far its objects are from a tool is told with a cell.
+  // Distances need the place where a tool starts: they are judged together with a cell.
   const double anywhere_m = std::numeric_limits<double>::infinity();
   tell(controller::scene_doubts(scene, models::Vec3::Zero(), anywhere_m));
   return check_laws(scene, options);

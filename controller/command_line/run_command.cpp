@@ -88,7 +88,7 @@ int run_command(const RunOptions& given) {
   if (!options.bus.simulated()) refuse_for_interfaces(options);
   PreparedSession session = prepare(options);
   know_zero(session, options);
-  for (const std::string& line : surprises(session)) std::fprintf(stderr, "proxarm: warning: %s\n", line.c_str());
+  warn_of_surprises(session);
   require_runnable(session, options);
   refuse_view(session, options);
   require_changes(session, options);

@@ -318,7 +318,7 @@ int tune_command(const RunOptions& options) {
                                    .found = "a cell of the impedance type",
                                    .expected = "one whose drives take positions: `run` judges a coupling's K and B"});
   }
-  for (const std::string& line : surprises(session)) std::fprintf(stderr, "proxarm: warning: %s\n", line.c_str());
+  warn_of_surprises(session);
   require_usable_start(session);
   require_inertia_in_range(session);
   Stages stages;

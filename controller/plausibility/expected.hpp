@@ -1,7 +1,7 @@
-// What a key's value usually is, and what one outside of that may have been meant as.
+// Usual ranges of keys, and the units in which a value outside of them may have been written.
 #pragma once
 
-#include <optional>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -13,30 +13,34 @@ struct OtherUnit {
   double in_key;
 };
 
+namespace units {
+inline constexpr double degree = std::numbers::pi / 180.0, one_g = 9.80665;
+inline constexpr OtherUnit mm{"mm", 1e-3}, mm_per_s{"mm/s", 1e-3}, mm_per_s2{"mm/s²", 1e-3},
+    m_per_min{"m/min", 1.0 / 60.0}, g{"g", 1e-3}, gravities{"g", one_g}, degrees{"degrees", degree},
+    degrees_per_s{"degrees/s", degree}, kHz{"kHz", 1e3}, ms{"ms", 1e-3}, kN{"kN", 1e3}, milli_N{"mN", 1e-3},
+    kNm{"kNm", 1e3}, kg_cm2{"kg cm²", 1e-4}, g_m2{"g m²", 1e-3};
+}  // namespace units
+
 struct Expected {
-  double low, high;  // in `unit`
-  const char* unit;  // "" if it has none
-  std::vector<OtherUnit> others;
+  double low, high;
+  const char* unit;               // of what is judged, "" if it has none
+  std::vector<OtherUnit> others;  // of the value in the file
 };
 
-// "limits.leash_m: found 20 m, expected 0.0001 to 0.3; if it is in mm, write 0.02". None if `value` is expected. Those
-// of the other units are named that lead to what is expected.
-std::optional<std::string> doubt(const std::string& key, double value, const Expected& expected);
+// What is judged in the place of a value where that says more, such as the frequency that a stiffness leads to:
+// "with which what is behind it swings at 0.4 Hz".
+struct Measure {
+  const char* value_unit;  // of the value in the file
+  double found;
+  double power;  // found ∝ value^power
+  std::string says;
+};
 
-// Adds it to `lines`, if there is one.
+// Adds "limits.leash_m: found 20 m, expected 0.0001 to 0.3; if it is in mm, write 0.02" to `lines` where the value
+// isn't expected. Of the other units those are named that lead to what is.
 void judge(const std::string& key, double value, const Expected& expected, std::vector<std::string>& lines);
-
-// The same where what is judged isn't the value itself, but `measure` of it, such as a frequency that it leads to;
-// `says` tells of that: "with which the arm behind it swings at 0.4 Hz". `expected` is in the measure's unit.
-struct Measured {
-  double value;                   // as the file has it
-  const char* unit;               // its own
-  double measure;                 // what it leads to
-  double power;                   // measure ∝ value^power
-  std::string says;               // of the measure
-  std::vector<OtherUnit> others;  // of the value
-};
-void judge_measure(const std::string& key, const Measured& found, double low, double high,
-                   std::vector<std::string>& lines);
+// The same by a measure of it; `expected` is the measure's.
+void judge(const std::string& key, double value, const Measure& measure, const Expected& expected,
+           std::vector<std::string>& lines);
 
 }  // namespace proxarm::controller

@@ -1,6 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <optional>
 
 #include "controller/plausibility/doubts.hpp"
 #include "controller/plausibility/expected.hpp"
@@ -13,11 +13,9 @@ namespace {
 using models::Vec3;
 using Lines = std::vector<std::string>;
 
-constexpr double degree = std::numbers::pi / 180.0;
 // An object that is further from the tool's start than this many reaches of the arm is never touched.
 constexpr double far_reaches = 10.0;
-const OtherUnit in_mm{"mm", 1e-3}, in_percent{"percent", 1e-2};
-const Expected friction{0.0, 3.0, "", {in_percent}};
+const Expected friction{0.0, 3.0, "", {{"percent", 1e-2}}};
 
 // How far a shape's surface is from a point, at least; absent for a mesh, of which its report speaks.
 std::optional<double> distance_m(const scenes::Shape& shape, const Vec3& from_W) {
@@ -67,9 +65,7 @@ class SceneDoubts {
     where_ = scene_.file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": " + name + ": ";
   }
 
-  void value(const char* key, double found, const Expected& expected) {
-    if (std::optional<std::string> line = doubt(key, found, expected)) lines_.push_back(where_ + *line);
-  }
+  void value(const char* key, double found, const Expected& expected) { judge(where_ + key, found, expected, lines_); }
 
   void judge_object(const scenes::Object& object) {
     begin(object.line, object.name);
@@ -82,13 +78,13 @@ class SceneDoubts {
     if (object.layer) {
       value("layer.stiffness_N_per_m", object.layer->stiffness_N_per_m,
             {20.0, 1e8, "N/m", {{"N/mm", 1e3}, {"kN/m", 1e3}, {"N/µm", 1e6}}});
-      value("layer.thickness_m", object.layer->thickness_m, {1e-6, 1.0, "m", {in_mm}});
+      value("layer.thickness_m", object.layer->thickness_m, {1e-6, 1.0, "m", {units::mm}});
     }
     if (!object.motion) return;
-    value("motion.velocity_m_per_s", object.motion->velocity_m_per_s.norm(), {0.0, 5.0, "m/s", {{"mm/s", 1e-3}}});
-    value("motion.amplitude_m", object.motion->amplitude_m.norm(), {0.0, 5.0, "m", {in_mm}});
+    value("motion.velocity_m_per_s", object.motion->velocity_m_per_s.norm(), {0.0, 5.0, "m/s", {units::mm_per_s}});
+    value("motion.amplitude_m", object.motion->amplitude_m.norm(), {0.0, 5.0, "m", {units::mm}});
     value("motion.turn_rad_per_s", std::abs(object.motion->turn_rad_per_s),
-          {0.0, 20.0, "rad/s", {{"degrees/s", degree}}});
+          {0.0, 20.0, "rad/s", {units::degrees_per_s}});
   }
 
   const scenes::Scene& scene_;
@@ -106,20 +102,20 @@ std::vector<std::string> scene_doubts(const scenes::Scene& scene, const Vec3& st
 
 std::vector<std::string> hand_doubts(const description::HandDescription& hand) {
   Lines lines;
-  judge("mass_kg", hand.mass_kg, {0.0, 30.0, "kg", {{"g", 1e-3}}}, lines);
+  judge("mass_kg", hand.mass_kg, {0.0, 30.0, "kg", {units::g}}, lines);
   if (hand.stiffness_N_per_m > 0.0) {
     judge("stiffness_N_per_m", hand.stiffness_N_per_m, {5.0, 1e6, "N/m", {{"N/mm", 1e3}, {"N/cm", 1e2}}}, lines);
   }
   judge("damping_Ns_per_m", hand.damping_Ns_per_m, {0.0, 5000.0, "Ns/m", {}}, lines);
-  judge("max_force_N", hand.max_force_N, {0.5, 3000.0, "N", {{"kN", 1e3}}}, lines);
+  judge("max_force_N", hand.max_force_N, {0.5, 3000.0, "N", {units::kN}}, lines);
   for (const description::Waypoint& waypoint : hand.waypoints) {
-    for (const double x : waypoint.offset_m) judge("waypoints.offset_m", x, {-20.0, 20.0, "m", {in_mm}}, lines);
+    for (const double x : waypoint.offset_m) judge("waypoints.offset_m", x, {-20.0, 20.0, "m", {units::mm}}, lines);
     for (const double x : waypoint.turn_rad) {
-      judge("waypoints.turn_rad", x, {-10.0, 10.0, "rad", {{"degrees", degree}}}, lines);
+      judge("waypoints.turn_rad", x, {-10.0, 10.0, "rad", {units::degrees}}, lines);
     }
   }
   for (const description::Sine& sine : hand.multisine) {
-    judge("multisine.amplitude_m", sine.amplitude_m, {-1.0, 1.0, "m", {in_mm}}, lines);
+    judge("multisine.amplitude_m", sine.amplitude_m, {-1.0, 1.0, "m", {units::mm}}, lines);
   }
   for (std::string& line : lines) line = hand.file.string() + ": " + line;
   return lines;

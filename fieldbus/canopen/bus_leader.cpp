@@ -90,34 +90,33 @@ std::vector<LeaderWatch> listen(CanNetwork& network, std::span<const BusToLead> 
   return watches;
 }
 
+// Throws the problem of the first bus on which something was seen.
+void refuse_if_seen(CanNetwork& network, std::span<const BusToLead> buses, const std::vector<LeaderWatch>& watches,
+                    description::SetupProblem problem) {
+  for (std::size_t i = 0; i < buses.size(); ++i) {
+    if (!watches[i].seen()) continue;
+    problem.bus = network.bus(buses[i].bus).name();
+    problem.found = watches[i].signs();
+    throw description::SetupError(std::move(problem));
+  }
+}
+
 }  // namespace
 
 void require_nobody_leads(CanNetwork& network, std::span<const BusToLead> buses, std::int64_t time_ns,
                           const FrameHandler& other) {
-  const std::vector<LeaderWatch> watches = listen(network, buses, Listening::for_leader, time_ns, other);
-  for (std::size_t i = 0; i < buses.size(); ++i) {
-    if (!watches[i].seen()) continue;
-    throw description::SetupError(
-        {.bus = network.bus(buses[i].bus).name(),
-         .message = "somebody leads this bus, and nothing was sent",
-         .found = watches[i].signs(),
-         .expected = "a bus that nobody leads",
-         .advice = "end the other session or master first: two would disturb each other's drives"});
-  }
+  refuse_if_seen(network, buses, listen(network, buses, Listening::for_leader, time_ns, other),
+                 {.message = "somebody leads this bus, and nothing was sent",
+                  .expected = "a bus that nobody leads",
+                  .advice = "end the other session or master first: two would disturb each other's drives"});
 }
 
 void require_nobody_plays(CanNetwork& network, std::span<const BusToLead> buses, std::int64_t time_ns) {
-  const std::vector<LeaderWatch> watches = listen(network, buses, Listening::for_nodes, time_ns, {});
-  for (std::size_t i = 0; i < buses.size(); ++i) {
-    if (!watches[i].seen()) continue;
-    throw description::SetupError(
-        {.bus = network.bus(buses[i].bus).name(),
-         .message = "a drive of this cell is on this bus already, and nothing was sent",
-         .found = watches[i].signs(),
-         .expected = "a bus without the nodes that are to be simulated",
-         .advice = "end the other `proxarm sim`, or take the real drives off: two of one node answer each other's "
-                   "requests"});
-  }
+  refuse_if_seen(network, buses, listen(network, buses, Listening::for_nodes, time_ns, {}),
+                 {.message = "a drive of this cell is on this bus already, and nothing was sent",
+                  .expected = "a bus without the nodes that are to be simulated",
+                  .advice = "end the other `proxarm sim`, or take the real drives off: two of one node answer each "
+                            "other's requests"});
 }
 
 }  // namespace proxarm::fieldbus

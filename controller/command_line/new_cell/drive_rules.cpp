@@ -61,7 +61,7 @@ double rounded(double x) { return x > 0.0 ? std::round(x / second_digit(x)) * se
 
 double rounded_down(double x) { return std::floor(x / second_digit(x)) * second_digit(x); }
 
-// What a drive of this torque has beside the arm's weight in its worst pose.
+// The torque that a drive has left while it bears the arm in its worst pose.
 double left_Nm(double torque_Nm, const Load& load) {
   return torque_share * torque_Nm - weight_margin * load.most_gravity;
 }

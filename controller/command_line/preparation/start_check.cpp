@@ -313,9 +313,7 @@ std::vector<std::string> surprises(const PreparedSession& session) {
   add(controller::hand_doubts(session.hand));
   add(weight_surprises(session, arm));
   add(hand_surprises(session));
-  if (session.scene.tool) {
-    add(tool_surprises(*session.scene.tool, reach_m));
-  }
+  if (session.scene.tool) add(tool_surprises(*session.scene.tool, reach_m));
   for (const scenes::Object& object : session.scene.objects) {
     const auto* const mesh = std::get_if<scenes::MeshShape>(&object.shape);
     if (mesh == nullptr || !mesh->mesh) continue;
@@ -325,6 +323,10 @@ std::vector<std::string> surprises(const PreparedSession& session) {
     }
   }
   return lines;
+}
+
+void warn_of_surprises(const PreparedSession& session) {
+  for (const std::string& line : surprises(session)) std::fprintf(stderr, "proxarm: warning: %s\n", line.c_str());
 }
 
 void require_enabling_switch(const PreparedSession& session, const RunOptions& options) {

@@ -17,6 +17,7 @@ void require_runnable(const PreparedSession& session, const RunOptions& options)
 // of the scene's meshes (scenes/mesh_files/mesh_report.hpp), a rigid tool that is longer than the arm, and where the
 // arm's weight takes all that setpoints may ask of a drive (controller/setpoints/held_weight.hpp).
 std::vector<std::string> surprises(const PreparedSession& session);
+void warn_of_surprises(const PreparedSession& session);  // on standard error
 
 // Throws SetupError for an arm that can't be built (URDF without a drive's joint, and the like), for axes whose tool
 // can't go straight in any direction, for a start pose in a singularity, from which the tool can't move in some
