@@ -27,6 +27,20 @@ class Tour(unittest.TestCase):
                 with self.subTest(document=document.name, target=target, anchor=anchor):
                     self.assertIn(anchor, headings)
 
+    def test_every_hunt_is_there_and_on_its_page(self):
+        """`torque_weights` stood in the nightly script for days without its file."""
+        script = (harness.SOURCE / ".ci" / "nightly").read_text()
+        hunts = re.search(r'^readonly all="(.*)"$', script, re.MULTILINE)[1].split()
+        page = (harness.SOURCE / "docs" / "development.md").read_text()
+        self.assertEqual(set(hunts), set(re.findall(r"^hunt_(\w+)\(\)", script, re.MULTILINE)))
+        for name in hunts:
+            with self.subTest(hunt=name):
+                self.assertTrue(f"\n| `{name}` |" in page, "has no row in docs/development.md")
+        files = set(re.findall(r"tests/soak/\w+\.py", script))
+        self.assertGreater(len(files), 10)
+        for file in files:
+            self.assertTrue((harness.SOURCE / file).exists(), file)
+
     def test_every_name_on_the_tour_stands_in_its_file(self):
         tour = harness.SOURCE / "docs" / "tour.md"
         rows = re.findall(r"^\| (?:&nbsp;)*\[[^\]]+\]\(([^)]+)\) \| (`[^|]+`) \|", tour.read_text(), re.MULTILINE)

@@ -43,13 +43,13 @@ def run(cell, scene, arguments, record):
 
 
 class Record:
-    """The cycles of a record's signals.csv in which the scene was rendered."""
+    """The cycles of a record's signals.csv in which the scene was rendered, or all of them."""
 
-    def __init__(self, file):
+    def __init__(self, file, every_phase=False):
         with open(file, newline="") as text:
             rows = csv.reader(text)
             self.at = {name: i for i, name in enumerate(next(rows))}
-            self.rows = [row for row in rows if row[self.at["phase"]] == "rendering"]
+            self.rows = [row for row in rows if every_phase or row[self.at["phase"]] == "rendering"]
 
     def column(self, name):
         return [float(row[self.at[name]]) for row in self.rows]
