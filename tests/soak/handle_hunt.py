@@ -29,6 +29,7 @@ ALONG = {"linear": (1.0, 0.0, 0.0)}  # where the tool moves on a line alone
 CALM = ("default", "cobot", "seven", "scara")
 LET_GO_M, PUSH_SHARE, NOBODY_M = 0.1, 0.02, 2e-3
 PUSH_MOST_M, PUSH_MOST_M_PER_S = 0.25, 0.35
+LEFT_KG = 0.05  # a simulated hand that lets go leaves its mass at the handle, and a real one doesn't
 
 
 def hand_text(name, mass, stiffness, damping, points, released_s=None):
@@ -84,7 +85,10 @@ def led(chance, cell, kind):
                 points.append((arrives_s, [share * reach * x for x in way]))
             ends_s = arrives_s + 0.5
     released_s = ends_s if chance.random() < 0.5 else None
-    return hand_text(kind, *arm_of_a_person(chance), points, released_s), released_s, ends_s + 1.5
+    mass, stiffness, damping = arm_of_a_person(chance)
+    if released_s is not None:
+        mass = min(mass, LEFT_KG)
+    return hand_text(kind, mass, stiffness, damping, points, released_s), released_s, ends_s + 1.5
 
 
 def pushed(chance, cell, folder):
