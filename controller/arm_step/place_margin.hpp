@@ -59,6 +59,10 @@ class PlaceMargin {
         models::Mat3::Zero();  // P: how the wrist moves when the last three joints turn the tool
   };
   [[nodiscard]] Wrist wrist(const models::ToolKinematics& at) const noexcept;
+  // The smallest σ there, m/rad, of an arm that may be anywhere.
+  [[nodiscard]] double smallest(const models::ToolKinematics& at) const noexcept {
+    return singular(wrist(at).J_W).value[0];
+  }
 
  private:
   // Of J: values from the smallest on, and their left vectors.

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include "controller/command_line/new_cell/arm_source.hpp"
@@ -179,16 +180,49 @@ class NewCell {
     cell_.sensor.pose_link.rpy_rad = {rounded(ypr[2]), rounded(ypr[1]), rounded(ypr[0])};
   }
 
+  // How heavy the arm has to feel there, by the model of the loop; infinite: no mass is stable, or it can't begin.
+  double least_kg(const StartPose& start, const models::Arm& arm, const models::ToolSpace& space,
+                  const description::HandDescription& hand) {
+    constexpr double never = std::numeric_limits<double>::infinity();
+    begin_at(start, arm, space, hand);
+    save();
+    try {
+      const PreparedSession session = prepare(run_);
+      controller::LoopModel loop = led_loop(session);
+      loop.horizon_s = 0.0;
+      return smallest_with_margins(hand_model(session), loop).value_or(never);
+    } catch (const SetupError&) {
+      return never;
+    }
+  }
+
+  // Of starts that look alike, what a hand notices is the mass: the lightest come first, by steps of a fifth.
+  void sort_by_mass(std::vector<StartPose>& starts, const models::Arm& arm, const models::ToolSpace& space,
+                    const description::HandDescription& hand) {
+    constexpr double step = 1.2;
+    std::vector<std::pair<double, StartPose>> judged;
+    const std::vector<std::string> remarks = source_.remarks;
+    for (const StartPose& start : starts) {
+      judged.emplace_back(std::floor(std::log(least_kg(start, arm, space, hand)) / std::log(step)), start);
+      source_.remarks = remarks;
+    }
+    std::stable_sort(judged.begin(), judged.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (std::size_t k = 0; k < starts.size(); ++k) starts[k] = judged[k].second;
+  }
+
   // Where the arm isn't steady from the best start, or can't begin there, others are tried.
   void choose() {
-    constexpr std::size_t most = 3;
+    constexpr std::size_t judged = 8, most = 3;
     const models::Arm arm(cell_);
     const models::ToolSpace space = models::tool_space(arm);
     const description::HandDescription hand =
         with_way_in(space, description::load_hand(shipped_file("sim/hands/touch.yaml")));
     const std::vector<std::string> remarks = source_.remarks;
     std::optional<SetupError> first;
-    for (const StartPose& start : find_starts(arm, hand, most)) {
+    std::vector<StartPose> starts = find_starts(arm, hand, judged);
+    if (starts.size() > 1) sort_by_mass(starts, arm, space, hand);
+    if (starts.size() > most) starts.resize(most);
+    for (const StartPose& start : starts) {
       source_.remarks = remarks;
       if (first)
         source_.remarks.push_back("from a start that looked better it wasn't fine: " + first->problem().message);

@@ -1,9 +1,12 @@
 #include "controller/command_line/new_cell/start_pose.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
+#include "controller/arm_step/place_margin.hpp"
 #include "models/arm/inverse_kinematics.hpp"
 #include "models/arm/tool_space.hpp"
 
@@ -13,7 +16,7 @@ namespace {
 using models::JointVector;
 using models::Vec3;
 
-constexpr int poses = 4000;
+constexpr int poses = 20000;
 constexpr std::size_t tried = 600;  // of them, whether the hand's way can be gone
 // Of that way, per metre of reach up to one: less than what a call of the inverse kinematics may turn joints by.
 constexpr double step_share = 2e-3;
@@ -47,6 +50,48 @@ double reach_of(const models::Arm& arm) {
   return reach_m > 0.0 ? reach_m : 1.0;
 }
 
+// A joint that can be turned by more than once does so for nothing.
+void turn_within_once(const models::Arm& arm, JointVector& q) {
+  constexpr double once = 2.0 * std::numbers::pi;
+  for (int i = 0; i < arm.axes(); ++i) {
+    if (arm.slides(i)) continue;
+    const double turned = q[i] - once * std::round(q[i] / once);
+    if (turned > arm.lower_rad()[i] && turned < arm.upper_rad()[i]) q[i] = turned;
+  }
+}
+
+// An arm on an upright first joint is the same in whatever direction that has turned it: straight ahead is what people
+// take. Where the joint's range doesn't let it, it stays.
+void turn_ahead(const models::Arm& arm, JointVector& q) {
+  constexpr double upright = 0.999;
+  const auto first = static_cast<Eigen::Index>(arm.drive_along_chain(0));
+  models::ToolKinematics at;
+  arm.kinematics(q, at);
+  const double up = at.J_W.col(first).tail<3>().z();
+  if (arm.slides(static_cast<int>(first)) || std::abs(up) < upright) return;
+  const Vec3 p = at.X_WT.translation() - at.joint_W[0];
+  const double turned = q[first] - std::copysign(std::atan2(p.y(), p.x()), up);
+  for (const double full : {0.0, 2.0 * std::numbers::pi, -2.0 * std::numbers::pi}) {
+    if (turned + full <= arm.lower_rad()[first] || turned + full >= arm.upper_rad()[first]) continue;
+    q[first] = turned + full;
+    return;
+  }
+}
+
+// How well the tool's place can be moved, as a share of what is well, and how far a wrist is from its own singularity:
+// the sine of its middle angle, of which a half is well. The smaller of the two, at most 1.
+double dexterity(const models::Arm& arm, const controller::PlaceMargin& places, const JointVector& q, double reach_m) {
+  constexpr double well_share = 0.25, well_sine = 0.5;
+  models::ToolKinematics at;
+  arm.kinematics(q, at);
+  const double place = places.smallest(at) / (well_share * reach_m);
+  if (arm.axes() < 6) return std::min(place, 1.0);
+  const Eigen::Index last = arm.drive_along_chain(static_cast<std::size_t>(arm.axes()) - 1);
+  const Eigen::Index third = arm.drive_along_chain(static_cast<std::size_t>(arm.axes()) - 3);
+  const Vec3 first_axis = at.J_W.col(third).tail<3>(), last_axis = at.J_W.col(last).tail<3>();
+  return std::min({place, first_axis.cross(last_axis).norm() / well_sine, 1.0});
+}
+
 double smallest_singular_value(const models::InverseKinematics& inverse, const models::Arm& arm, const JointVector& q) {
   models::InverseKinematicsResult result;
   inverse.solve(q, arm.tool_pose(q), result);
@@ -63,13 +108,12 @@ Vec3 judged_from(const models::ArmPoints& points_W, double reach_m) {
 }
 
 // Each part is between 0 and its weight.
-double score(const models::Arm& arm, const models::InverseKinematics& inverse, const JointVector& q, double reach_m) {
+double score(const models::Arm& arm, const controller::PlaceMargin& places, const JointVector& q, double reach_m) {
   const models::Pose X_WT = arm.tool_pose(q);
   models::ArmPoints points_W;
   arm.points(q, points_W);
   const Vec3 from = judged_from(points_W, reach_m);
   const Vec3 p = X_WT.translation() - from, z = X_WT.linear().col(2);
-  const double singular = std::min(smallest_singular_value(inverse, arm, q) / (0.25 * reach_m), 1.0);
   const double free = std::min(room(arm, q) / 0.4, 1.0);
   const double points = std::max({z.x(), -z.z(), 0.0});
   const double ahead = std::clamp(p.x() / (0.5 * reach_m), -1.0, 1.0) - std::min(std::abs(p.y()) / reach_m, 1.0);
@@ -79,7 +123,7 @@ double score(const models::Arm& arm, const models::InverseKinematics& inverse, c
   for (int i = 1; i < arm.axes(); ++i) {
     below = std::max(below, (from.z() - points_W.joint_W[static_cast<std::size_t>(i)].z()) / reach_m);
   }
-  return 2.0 * singular + free + points + ahead - 4.0 * off - 4.0 * below;
+  return 2.0 * dexterity(arm, places, q, reach_m) + free + points + ahead - 4.0 * off - 4.0 * below;
 }
 
 bool can_be_gone(const models::Arm& arm, models::InverseKinematics inverse, const JointVector& start,
@@ -108,38 +152,51 @@ bool can_be_gone(const models::Arm& arm, models::InverseKinematics inverse, cons
   return true;
 }
 
+// Poses all over the joints' ranges, the best first; straight ahead, or wherever the first joint has them.
+std::vector<JointVector> sorted_poses(const models::Arm& arm, double reach_m, bool ahead) {
+  struct Candidate {
+    double score;
+    JointVector q;
+  };
+  const controller::PlaceMargin places(arm, models::tool_space(arm));
+  std::vector<Candidate> candidates;
+  candidates.reserve(poses);
+  for (int k = 0; k < poses; ++k) {
+    JointVector q = models::spread_pose(arm, k);
+    if (ahead) turn_ahead(arm, q);
+    turn_within_once(arm, q);
+    for (int i = 0; i < arm.axes(); ++i) q[i] = std::round(1e4 * q[i]) / 1e4;  // as it is written
+    candidates.push_back({score(arm, places, q, reach_m), q});
+  }
+  std::sort(candidates.begin(), candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+  std::vector<JointVector> sorted;
+  for (std::size_t k = 0; k < tried; ++k) sorted.push_back(candidates[k].q);
+  return sorted;
+}
+
 }  // namespace
 
 std::vector<StartPose> find_starts(const models::Arm& arm, const description::HandDescription& hand, std::size_t most) {
   const models::InverseKinematics inverse(arm);
   const double reach_m = reach_of(arm), step_m = step_share * std::min(reach_m, 1.0);
-  struct Candidate {
-    double score;
-    JointVector q;
-  };
-  std::vector<Candidate> candidates;
-  candidates.reserve(poses);
-  for (int k = 0; k < poses; ++k) {
-    JointVector q = models::spread_pose(arm, k);
-    for (int i = 0; i < arm.axes(); ++i) q[i] = std::round(1e4 * q[i]) / 1e4;  // as it is written
-    candidates.push_back({score(arm, inverse, q, reach_m), q});
-  }
-  std::sort(candidates.begin(), candidates.end(),
-            [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   std::vector<StartPose> found;
   const auto is_another = [&](const JointVector& q) {
     return std::all_of(found.begin(), found.end(),
                        [&](const StartPose& start) { return (start.q - q).cwiseAbs().maxCoeff() > another_rad; });
   };
+  const std::array sorted{sorted_poses(arm, reach_m, true), sorted_poses(arm, reach_m, false)};
   for (const double share : {1.0, 0.5, 0.25, 0.1}) {
     const description::HandDescription shorter = with_shorter_way(hand, share);
-    for (std::size_t k = 0; k < tried && found.size() < most; ++k) {
-      const JointVector& q = candidates[k].q;
-      if (is_another(q) && can_be_gone(arm, inverse, q, shorter, step_m)) found.push_back({q, share});
+    for (const std::vector<JointVector>& starts : sorted) {
+      for (const JointVector& q : starts) {
+        if (found.size() == most) break;
+        if (is_another(q) && can_be_gone(arm, inverse, q, shorter, step_m)) found.push_back({q, share});
+      }
+      if (!found.empty()) return found;
     }
-    if (!found.empty()) return found;
   }
-  return {{candidates[0].q, 0.0}};
+  return {{sorted[0].front(), 0.0}};
 }
 
 description::HandDescription with_shorter_way(description::HandDescription hand, double share) {
