@@ -216,23 +216,50 @@ void FeltMassCurve::add_segment() {
         phase *= turn;
       }
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        sums_[band].force_acceleration += F[axis] * std::conj(a[axis]);
-        sums_[band].force += std::norm(F[axis]);
-        sums_[band].acceleration += std::norm(a[axis]);
+        Sums& sums = sums_[band][axis];
+        sums.force_acceleration += F[axis] * std::conj(a[axis]);
+        sums.force += std::norm(F[axis]);
+        sums.acceleration += std::norm(a[axis]);
       }
     }
   }
   ++segments_;
 }
 
+FeltMassCurve::Sums FeltMassCurve::all_axes(std::size_t band) const {
+  Sums all;
+  for (const Sums& of_axis : sums_[band]) {
+    all.force_acceleration += of_axis.force_acceleration;
+    all.force += of_axis.force;
+    all.acceleration += of_axis.acceleration;
+  }
+  return all;
+}
+
+// Nothing where the force isn't that of one mass.
+std::optional<FeltMassCurve::Point> FeltMassCurve::point(std::size_t band, const Sums& s) const {
+  if (segments_ < least_segments || !(s.acceleration > 0.0)) return std::nullopt;
+  if (!(std::norm(s.force_acceleration) >= least_coherence * s.force * s.acceleration)) return std::nullopt;
+  return Point{band_Hz(band, bands), s.force_acceleration / s.acceleration};
+}
+
 std::vector<FeltMassCurve::Point> FeltMassCurve::points() const {
   std::vector<Point> points;
-  if (segments_ < least_segments) return points;
   for (std::size_t band = 0; band < bands; ++band) {
-    const Sums& s = sums_[band];
-    if (!(std::norm(s.force_acceleration) >= least_coherence * s.force * s.acceleration) || !(s.acceleration > 0.0))
-      continue;
-    points.push_back({band_Hz(band, bands), s.force_acceleration / s.acceleration});
+    if (const auto there = point(band, all_axes(band))) points.push_back(*there);
+  }
+  return points;
+}
+
+std::vector<FeltMassCurve::Point> FeltMassCurve::points_along(std::size_t axis) const {
+  constexpr double least_share = 0.25;  // of the strongest axis' squared acceleration
+  std::vector<Point> points;
+  for (std::size_t band = 0; band < bands; ++band) {
+    double strongest = 0.0;
+    for (const Sums& of_axis : sums_[band]) strongest = std::max(strongest, of_axis.acceleration);
+    const Sums& sums = sums_[band][axis];
+    if (sums.acceleration < least_share * strongest) continue;
+    if (const auto there = point(band, sums)) points.push_back(*there);
   }
   return points;
 }

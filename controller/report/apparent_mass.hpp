@@ -75,8 +75,11 @@ class FeltMassCurve {
     double frequency_Hz = 0.0;
     std::complex<double> mass_kg;
   };
-  // In the order of their frequencies; empty where nothing was excited.
+  // Of all directions together, in the order of their frequencies; empty where nothing was excited.
   [[nodiscard]] std::vector<Point> points() const;
+  // Along one axis of W (0 to 2). Where the tool moves along another one and this one less than half as much, its
+  // motion is what the others make of it, and says nothing of its own mass: such a band is left out.
+  [[nodiscard]] std::vector<Point> points_along(std::size_t axis) const;
 
  private:
   static constexpr std::size_t bands = 18;
@@ -87,6 +90,8 @@ class FeltMassCurve {
 
   void add_average(const models::Vec3& force_N, const models::Vec3& acceleration);
   void add_segment();
+  [[nodiscard]] Sums all_axes(std::size_t band) const;
+  [[nodiscard]] std::optional<Point> point(std::size_t band, const Sums& sums) const;
 
   double period_s_;
   std::size_t samples_per_average_, averages_per_segment_;
@@ -95,7 +100,7 @@ class FeltMassCurve {
   models::Vec3 force_sum_ = models::Vec3::Zero(), acceleration_sum_ = models::Vec3::Zero();
   std::size_t summed_ = 0;
   std::vector<models::Vec3> force_, acceleration_;  // of the segment that is being filled
-  std::array<Sums, bands> sums_{};
+  std::array<std::array<Sums, 3>, bands> sums_{};   // of each band and axis
   std::size_t segments_ = 0;
 };
 

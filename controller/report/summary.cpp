@@ -429,6 +429,7 @@ Summary SummaryBuilder::finish() {
   summary.tracking_lag_max_m = s.lagging.largest();
   summary.tracking_delay_s = (s.config.setpoint_delay_cycles - 1) * s.config.period_s;
   summary.felt_mass = s.felt.points();
+  for (std::size_t axis = 0; axis < 3; ++axis) summary.felt_mass_along[axis] = s.felt.points_along(axis);
   if (const auto apparent = s.apparent.estimate()) {
     summary.apparent_mass_kg = apparent->mass_kg;
     summary.apparent_damping_Ns_per_m = apparent->damping_Ns_per_m;

@@ -21,8 +21,7 @@
 //                           force on the proxy is below 1 mN (apparent_mass.hpp);
 //                           apparent_damping_Ns_per_m is its Im
 //   felt_mass, _band_Hz     F_h/a by frequency, and up to which one |F_h/a − M|/M is at most so much, where the same
-//   free
-//                           motion excites it (FeltMassCurve)
+//                           free motion excites it (FeltMassCurve); _band_Hz_along: along each axis of W
 //   apparent_inertia_kg_m2  the same of the tool's rotation, from the hand's torque about the rendered point and the
 //                           tool's rotation vector from where rendering began; of simulations whose tool turns
 //   contact_force_error_N   root mean square, over cycles of established contact, of n·f − push, where
@@ -182,6 +181,7 @@ struct Summary {
   std::optional<double> friction_ratio_error;
   double pulling_force_max_N = 0.0, drag_force_max_N = 0.0;
   std::vector<FeltMassCurve::Point> felt_mass;  // by frequency; empty: the session didn't excite it
+  std::array<std::vector<FeltMassCurve::Point>, 3> felt_mass_along;  // the same along each axis of W
   double contact_time_s = 0.0, sliding_time_s = 0.0;
   std::uint64_t contacts = 0;                         // how often the proxy came to touch
   std::uint64_t limited_cycles = 0;                   // some limit was active

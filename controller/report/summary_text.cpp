@@ -131,11 +131,21 @@ Json felt_mass(const Summary& s) {
 
 constexpr std::array<std::pair<const char*, double>, 3> felt_limits{{{"5 %", 0.05}, {"10 %", 0.1}, {"25 %", 0.25}}};
 
-Json felt_bands(const Summary& s) {
-  if (s.felt_mass.empty() || !(s.wanted_mass_kg > 0.0)) return nullptr;
+constexpr std::array axis_names{"x", "y", "z"};
+
+Json felt_bands(const std::vector<FeltMassCurve::Point>& felt_mass, double wanted_kg) {
+  if (felt_mass.empty() || !(wanted_kg > 0.0)) return nullptr;
   Json bands;
-  for (const auto& [name, limit] : felt_limits) bands[name] = band_within_Hz(s.felt_mass, s.wanted_mass_kg, limit);
+  for (const auto& [name, limit] : felt_limits) bands[name] = band_within_Hz(felt_mass, wanted_kg, limit);
   return bands;
+}
+
+Json felt_bands_along(const Summary& s) {
+  Json along;
+  for (std::size_t axis = 0; axis < axis_names.size(); ++axis) {
+    along[axis_names[axis]] = felt_bands(s.felt_mass_along[axis], s.wanted_mass_kg);
+  }
+  return along;
 }
 
 void add_repeatable(Json& json, const Summary& s) {
@@ -156,7 +166,8 @@ void add_repeatable(Json& json, const Summary& s) {
   json["apparent_mass_kg"] = s.apparent_mass_kg;
   json["apparent_damping_Ns_per_m"] = s.apparent_damping_Ns_per_m;
   json["felt_mass"] = felt_mass(s);
-  json["felt_mass_band_Hz"] = felt_bands(s);
+  json["felt_mass_band_Hz"] = felt_bands(s.felt_mass, s.wanted_mass_kg);
+  json["felt_mass_band_Hz_along"] = felt_bands_along(s);
   json["unresolved_steps"] = s.unresolved_steps;
   json["wanted_inertia_kg_m2"] = s.wanted_inertia_kg_m2 > 0.0 ? Json(s.wanted_inertia_kg_m2) : Json(nullptr);
   json["apparent_inertia_kg_m2"] = s.apparent_inertia_kg_m2;
@@ -314,6 +325,24 @@ void tell_time(const Summary& s, Lines& line) {
 }
 
 // Up to which frequency the mass is what it should be, and what it is where that is worst.
+// Of the directions in which the tool was moved, the worst first: where an arm feels right along x only, it doesn't.
+std::string felt_along(const Summary& s) {
+  const auto& [name, limit] = felt_limits[1];
+  std::vector<std::pair<double, const char*>> along;
+  for (std::size_t axis = 0; axis < axis_names.size(); ++axis) {
+    const std::vector<FeltMassCurve::Point>& felt_mass = s.felt_mass_along[axis];
+    if (felt_mass.empty()) continue;
+    along.emplace_back(band_within_Hz(felt_mass, s.wanted_mass_kg, limit), axis_names[axis]);
+  }
+  std::sort(along.begin(), along.end());
+  std::string text;
+  for (const auto& [band_Hz, axis] : along) {
+    text += (text.empty() ? "within " + std::string(name) + " along " : ", ") + std::string(axis);
+    text += band_Hz > 0.0 ? format(" up to %.2g Hz", band_Hz) : " nowhere";
+  }
+  return text;
+}
+
 void tell_felt_mass(const Summary& s, Lines& line) {
   if (s.felt_mass.empty() || !(s.wanted_mass_kg > 0.0)) return;
   std::string bands;
@@ -323,6 +352,7 @@ void tell_felt_mass(const Summary& s, Lines& line) {
     bands += band_Hz > 0.0 ? format(" up to %.2g Hz", band_Hz) : " nowhere";
   }
   line("mass by frequency", bands);
+  if (const std::string along = felt_along(s); !along.empty()) line("", along);
   const FeltMassCurve::Point& last = s.felt_mass.back();
   line("", format("at %.3g Hz ", last.frequency_Hz) + format("%.3g kg in phase, ", last.mass_kg.real()) +
                format("phase %.0f degrees", 180.0 / std::numbers::pi * std::arg(last.mass_kg)));

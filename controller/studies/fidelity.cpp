@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <sstream>
+#include <string_view>
 
 #include "controller/studies/common/chart.hpp"
 
@@ -21,12 +22,13 @@ using Complex = std::complex<double>;
 constexpr std::array<double, 3> limits{0.05, 0.1, 0.25};
 constexpr std::array<double, 13> frequencies_Hz{0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0};
 
-// At low frequencies as much travel as a hand takes, above a velocity of 5 cm/s each.
-std::vector<ArmSine> sines(bool wall) {
+// At low frequencies as much travel as a hand takes, above a velocity of 5 cm/s each. A light arm gets half of it: what
+// the hand exerts while the sensor is tared must be little of what its drives bear.
+std::vector<ArmSine> sines(bool wall, bool light) {
   std::vector<ArmSine> list;
   for (const double f : frequencies_Hz) {
     const double amplitude = std::min(wall ? 1e-3 : 0.012, 0.05 / (2.0 * std::numbers::pi * f));
-    list.push_back({f, amplitude});
+    list.push_back({f, light ? 0.5 * amplitude : amplitude});
   }
   return list;
 }
@@ -43,15 +45,17 @@ std::vector<ArmSetup> setups(bool quick) {
   // The transient of the start fades with the time constant 2M/D, D = 13 Ns/m (a hand's 20 Ns/m without what the loop's
   // lag takes away). Every mass gets 12 of them, since at 0.1 Hz a tenth of a newton counts.
   const auto settling = [quick](double mass) { return std::max(quick ? 3.0 : 12.0, (quick ? 0.6 : 2.0) * mass); };
-  const auto add = [&](double mass, double period, double drive, bool wall, bool looks_ahead = false) {
-    list.push_back({.mass_kg = mass,
+  const auto add = [&](double mass, double period, double drive, bool wall, bool looks_ahead = false,
+                       const char* cell = "default") {
+    list.push_back({.cell = cell,
+                    .mass_kg = mass,
                     .period_s = period,
                     .drive_factor = drive,
                     .wall = wall,
                     .looks_ahead = looks_ahead,
                     .settling_s = settling(mass),
                     .duration_s = quick ? 10.0 : 30.0,
-                    .sines = sines(wall)});
+                    .sines = sines(wall, std::string_view(cell) != "default")});
   };
   add(4.0, 1e-3, 1.0, false);
   add(4.0, 1e-3, 1.0, true);
@@ -68,13 +72,16 @@ std::vector<ArmSetup> setups(bool quick) {
   };
   turn(0.1, 1e-3, 1.0);
   if (quick) return list;
+  for (const char* cell : {"cobot", "seven"}) {
+    for (const bool looks_ahead : {false, true}) add(10.0, 1e-3, 1.0, false, looks_ahead, cell);
+  }
   for (const double inertia : {0.05, 0.2, 0.3}) turn(inertia, 1e-3, 1.0);
   turn(0.1, 2e-3, 1.0);
   turn(0.1, 1e-3, 0.5);
   add(2.0, 1e-3, 1.0, false);
   add(20.0, 1e-3, 1.0, false);
   add(4.0, 2e-3, 1.0, false);
-  add(4.0, 4e-3, 1.0, false);
+  add(6.0, 4e-3, 1.0, false);  // 4 kg swing there
   add(4.0, 2e-3, 1.0, true);
   add(4.0, 4e-3, 1.0, true);
   add(4.0, 1e-3, 0.5, false);
@@ -119,22 +126,30 @@ double band_Hz(const std::map<double, double>& error_of_Hz, double limit) {
   return before_Hz;
 }
 
+constexpr std::array directions{"x", "y", "z"};
+
 bool is_turning(const Table& table, std::size_t row) { return table.number(row, table.column("inertia_kg_m2")) != 0.0; }
 
 std::string label(const Table& table, std::size_t row) {
   const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
   const bool turning = is_turning(table, row);
+  const std::string& cell = table.text(row, table.column("cell"));
   char text[100];
-  std::snprintf(text, sizeof text, "%g %s, T = %g ms%s%s", value(turning ? "inertia_kg_m2" : "mass_kg"),
-                turning ? "kg m²" : "kg", 1e3 * value("period_s"), value("drive_factor") < 1.0 ? ", slow drives" : "",
+  std::snprintf(text, sizeof text, "%s%s%g %s, T = %g ms%s%s", cell == "default" ? "" : cell.c_str(),
+                cell == "default" ? "" : ", ", value(turning ? "inertia_kg_m2" : "mass_kg"), turning ? "kg m²" : "kg",
+                1e3 * value("period_s"), value("drive_factor") < 1.0 ? ", slow drives" : "",
                 value("lookahead") != 0.0 ? ", lookahead" : "");
   return text;
 }
 
+const std::string& direction(const Table& table, std::size_t row) { return table.text(row, table.column("along")); }
+
 }  // namespace
 
 std::vector<Column> Fidelity::columns() const {
-  return {{"wall"},
+  return {{"cell", true},
+          {"along", true},
+          {"wall"},
           {"mass_kg"},
           {"inertia_kg_m2"},
           {"period_s"},
@@ -156,19 +171,19 @@ std::vector<Column> Fidelity::columns() const {
 
 std::size_t Fidelity::jobs(const Options& options) const { return setups(options.quick).size(); }
 
-std::vector<Row> Fidelity::run(std::size_t job, const Options& options) const {
-  const ArmSetup setup = setups(options.quick)[job];
-  const std::vector<ArmSample> samples = arm_(setup);
+namespace {
+
+// One row per frequency; without figures where a fault has ended the session.
+void add_rows(const ArmSetup& setup, const std::vector<ArmSample>& samples, std::vector<Row>& rows) {
   const auto wanted = static_cast<std::size_t>(std::lround(setup.duration_s / setup.period_s));
   const bool whole = samples.size() >= wanted, turning = setup.turns();
   std::vector<double> F, x;
   for (const ArmSample& sample : samples) {
     if (F.size() == wanted) break;
-    F.push_back(turning ? sample.hand_torque_Nm.z() : sample.hand_force_N.x());
-    x.push_back(turning ? sample.turn_rad.z() : sample.tool_m.x());
+    F.push_back((turning ? sample.hand_torque_Nm : sample.hand_force_N)[setup.axis]);
+    x.push_back((turning ? sample.turn_rad : sample.tool_m)[setup.axis]);
   }
   const double asked = turning ? setup.inertia_kg_m2 : setup.mass_kg;
-  std::vector<Row> rows;
   for (const double f : frequencies_Hz) {
     const double omega = 2.0 * std::numbers::pi * f;
     const Complex force = coefficient(F, f, setup.period_s), travel = coefficient(x, f, setup.period_s);
@@ -176,7 +191,9 @@ std::vector<Row> Fidelity::run(std::size_t job, const Options& options) const {
     const std::array felt{
         std::abs(force),         std::abs(travel), mass.real(), mass.imag(), std::abs(mass - asked) / asked,
         std::abs(force / travel)};
-    Row row{setup.wall ? 1.0 : 0.0,
+    Row row{setup.cell,
+            directions[static_cast<std::size_t>(setup.axis)],
+            setup.wall ? 1.0 : 0.0,
             setup.mass_kg,
             setup.inertia_kg_m2,
             setup.period_s,
@@ -187,56 +204,127 @@ std::vector<Row> Fidelity::run(std::size_t job, const Options& options) const {
     for (std::size_t k = 0; k < 5; ++k) row.emplace_back(whole && turning ? felt[k] : std::nan(""));
     rows.push_back(row);
   }
+}
+
+}  // namespace
+
+std::vector<Row> Fidelity::run(std::size_t job, const Options& options) const {
+  ArmSetup setup = setups(options.quick)[job];
+  std::vector<Row> rows;
+  for (setup.axis = 0; setup.axis < (setup.wall ? 1 : 3); ++setup.axis) add_rows(setup, arm_(setup), rows);
   return rows;
 }
 
-json Fidelity::headline(const Table& table, const Options& /*options*/) const {
-  const auto value = [&](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
-  json of_default, by_setup, turning, shares, bands, width;
-  std::map<std::string, std::map<double, double>> errors;
-  std::int64_t ended = 0;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    char frequency[20];
-    std::snprintf(frequency, sizeof frequency, "%g", value(row, "frequency_Hz"));
-    if (!std::isfinite(value(row, is_turning(table, row) ? "torque_Nm" : "force_N"))) {
-      ++ended;
-      continue;
-    }
-    if (is_turning(table, row)) {
-      turning[label(table, row)][frequency] = value(row, "inertia_error");
-      shares[label(table, row)][frequency] = value(row, "inertia_real_kg_m2") / value(row, "inertia_kg_m2");
-      errors[label(table, row)][value(row, "frequency_Hz")] = value(row, "inertia_error");
-    } else if (value(row, "wall") == 0.0) {
-      by_setup[label(table, row)][frequency] = value(row, "mass_error");
-      errors[label(table, row)][value(row, "frequency_Hz")] = value(row, "mass_error");
-      if (table.job(row) == 0) of_default[frequency] = value(row, "mass_error");
-    } else {
-      width[label(table, row)][frequency] = value(row, "stiffness_N_per_m");
-    }
+namespace {
+
+// Figures by setup, and there by frequency in Hz: of the direction in which each is worst, and of each direction.
+class WorstOf {
+ public:
+  // Of two figures of one setup and frequency the one that is further from `wanted` counts.
+  explicit WorstOf(double wanted) : wanted_(wanted) {}
+  void add(const std::string& setup, const std::string& along, double frequency_Hz, double figure) {
+    std::map<double, double>& worst = worst_[setup];
+    const auto [at, is_new] = worst.emplace(frequency_Hz, figure);
+    if (!is_new && std::abs(figure - wanted_) > std::abs(at->second - wanted_)) at->second = figure;
+    each_[setup][along][frequency_text(frequency_Hz)] = figure;
   }
-  for (const auto& [name, error_of_Hz] : errors) {
+  [[nodiscard]] const std::map<std::string, std::map<double, double>>& worst() const { return worst_; }
+  [[nodiscard]] json worst_json() const {
+    json out = json::object();
+    for (const auto& [setup, figures] : worst_) {
+      for (const auto& [frequency_Hz, figure] : figures) out[setup][frequency_text(frequency_Hz)] = figure;
+    }
+    return out;
+  }
+  [[nodiscard]] const json& each_json() const { return each_; }
+
+ private:
+  static std::string frequency_text(double frequency_Hz) {
+    std::array<char, 20> text{};
+    std::snprintf(text.data(), text.size(), "%g", frequency_Hz);
+    return text.data();
+  }
+
+  double wanted_;
+  std::map<std::string, std::map<double, double>> worst_;
+  json each_ = json::object();
+};
+
+json bands_of(const WorstOf& errors) {
+  json bands;
+  for (const auto& [name, error_of_Hz] : errors.worst()) {
     for (const double limit : limits) bands[name][percent(limit)] = band_Hz(error_of_Hz, limit);
   }
+  return bands;
+}
+
+}  // namespace
+
+json Fidelity::headline(const Table& table, const Options& /*options*/) const {
+  const auto value = [&](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
+  WorstOf mass(0.0), inertia(0.0), shares(1.0), width(0.0);
+  std::int64_t ended = 0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string name = label(table, row), &along = direction(table, row);
+    const double f = value(row, "frequency_Hz");
+    if (!std::isfinite(value(row, is_turning(table, row) ? "torque_Nm" : "force_N"))) {
+      ++ended;
+    } else if (is_turning(table, row)) {
+      inertia.add(name, along, f, value(row, "inertia_error"));
+      shares.add(name, along, f, value(row, "inertia_real_kg_m2") / value(row, "inertia_kg_m2"));
+    } else if (value(row, "wall") == 0.0) {
+      mass.add(name, along, f, value(row, "mass_error"));
+    } else {
+      width.add(name, along, f, value(row, "stiffness_N_per_m"));
+    }
+  }
+  json bands = bands_of(mass);
+  bands.update(bands_of(inertia));
   return {
-      {"apparent_mass_error", of_default},
-      {"apparent_mass_error_by_setup", by_setup},
-      {"apparent_inertia_error_by_setup", turning},
-      {"apparent_inertia_over_wanted", shares},
+      {"apparent_mass_error_by_setup", mass.worst_json()},
+      {"apparent_mass_error_by_direction", mass.each_json()},
+      {"apparent_inertia_error_by_setup", inertia.worst_json()},
+      {"apparent_inertia_error_by_direction", inertia.each_json()},
+      {"apparent_inertia_over_wanted", shares.worst_json()},
       {"band_Hz", bands},
-      {"wall_stiffness_N_per_m", width},
+      {"wall_stiffness_N_per_m", width.worst_json()},
       {"ended_by_fault", ended},
       {"keys",
-       {{"apparent_mass_error", "by frequency in Hz: |F/a - M|/M at 4 kg, T = 1 ms in free motion of the default cell"},
-        {"apparent_mass_error_by_setup",
-         "the same for other masses, timesteps and drives (slow drives: half as fast), and with --lookahead auto"},
-        {"apparent_inertia_error_by_setup", "|tau/alpha - J|/J of a tool that is turned about z, with 4 kg"},
-        {"apparent_inertia_over_wanted", "Re(tau/alpha)/J of the same"},
-        {"band_Hz", "up to which frequency, from 0.3 Hz on, |F/a - M|/M, or that of the inertia, is at most so much"},
-        {"wall_stiffness_N_per_m", "by frequency: |F/x| of the handle while the hand leans on the wall"},
+       {{"apparent_mass_error_by_setup",
+         "by frequency in Hz: |F/a - M|/M in free motion, of x, y and z the worst, for masses, timesteps, drives (slow "
+         "drives: half as fast), with --lookahead auto, and of other cells than the default one"},
+        {"apparent_mass_error_by_direction", "the same along each of x, y and z of W"},
+        {"apparent_inertia_error_by_setup",
+         "|tau/alpha - J|/J of a tool that is turned with 4 kg, about x, y or z, whichever is worst"},
+        {"apparent_inertia_error_by_direction", "the same about each of x, y and z of W"},
+        {"apparent_inertia_over_wanted", "Re(tau/alpha)/J, where it is furthest from 1"},
+        {"band_Hz",
+         "up to which frequency, from 0.3 Hz on, the error of the mass, or of the inertia, is at most so much in every "
+         "direction"},
+        {"wall_stiffness_N_per_m", "by frequency: |F/x| of the handle while the hand leans on the wall, along x"},
         {"ended_by_fault", "rows without a figure because a fault ended their session"}}}};
 }
 
 namespace {
+
+// Of each job and frequency the row of the direction in which the error is largest.
+std::vector<bool> worst_rows(const Table& table) {
+  std::vector<bool> worst(table.rows(), false);
+  std::map<std::pair<std::size_t, double>, std::size_t> of;
+  const auto error = [&](std::size_t row) {
+    return table.number(row, table.column(is_turning(table, row) ? "inertia_error" : "mass_error"));
+  };
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto [at, is_new] =
+        of.emplace(std::pair{table.job(row), table.number(row, table.column("frequency_Hz"))}, row);
+    if (is_new || error(row) > error(at->second)) {
+      worst[at->second] = false;
+      at->second = row;
+    }
+    worst[at->second] = true;
+  }
+  return worst;
+}
 
 // One for each job whose rows are `drawn`, of what `y` says of a row. Drives of half the speed feel the same, to some
 // tenths of a per cent: they aren't drawn. `styles`: of each label.
@@ -244,9 +332,11 @@ template <typename Drawn, typename Value>
 std::vector<Curve> curves(const Table& table, Drawn drawn, Value y, std::map<std::string, int>& styles) {
   std::vector<Curve> list;
   std::map<std::size_t, std::size_t> of_job;
+  const std::vector<bool> worst = worst_rows(table);
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const double value = y(row);
-    if (!drawn(row) || !std::isfinite(value) || table.number(row, table.column("drive_factor")) != 1.0) continue;
+    if (!worst[row] || !drawn(row) || !std::isfinite(value) || table.number(row, table.column("drive_factor")) != 1.0)
+      continue;
     const auto [at, is_new] = of_job.emplace(table.job(row), list.size());
     if (is_new) {
       const std::string name = label(table, row);
@@ -305,13 +395,13 @@ std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*opt
   const auto at_wall = [&](std::size_t row) { return table.number(row, table.column("wall")) != 0.0; };
   const auto turns = [&](std::size_t row) { return is_turning(table, row); };
   const auto is_free = [&](std::size_t row) { return !at_wall(row) && !turns(row); };
-  Chart place{.title = "What the hand feels at the simulated arm",
+  Chart place{.title = "What the hand feels at the simulated arm, in the direction in which it is worst",
               .columns = 2,
               .panel_width = 640,
               .panel_height = 460,
               .common_key = true};
   Chart turning = place;
-  turning.title = "What the hand feels at the simulated arm, turning it (4 kg)";
+  turning.title = "What the hand feels at the simulated arm, turning it (4 kg), about the axis for which it is worst";
   Panel wall{.title = "Against a wall: stiffness felt",
              .x_label = "frequency (Hz)",
              .y_label = "|F/x| (N/m)",

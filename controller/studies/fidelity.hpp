@@ -4,13 +4,16 @@
 // The hand's intention is a sum of sines; force of the hand on the handle and the tool's true position are sampled once
 // a cycle, over whole periods of all sines, so that one Fourier coefficient per sine is exact. In free motion
 //   F/a = M_apparent(f) complex: its real part is the mass that is felt, its imaginary part −B/ω;
-// apparent_mass_error is |F/a − M|/M. Against a wall F/x is the stiffness that is felt. The two span the impedances
-// that can be rendered at this frequency (the Z-width). Turning, about z, it is the same of torque, turn and inertia.
+// apparent_mass_error is |F/a − M|/M. An arm doesn't feel alike in all directions, so free motion is measured along x,
+// y and z of W, a session each, and what counts is the worst of them. Against a wall, along x, F/x is the stiffness
+// that is felt. The two span the impedances that can be rendered at this frequency (the Z-width). Turning it is the
+// same of torque, turn and inertia.
 //
 // The caller provides the arm: the studies know no bus and no drive.
 #pragma once
 
 #include <functional>
+#include <string>
 #include <utility>
 
 #include "controller/studies/common/study.hpp"
@@ -22,8 +25,9 @@ struct ArmSine {
   double frequency_Hz = 1.0, amplitude = 0.0;  // m, or where the hand turns rad
 };
 
-// A session of the default cell, as the fidelity study wants it.
+// A session as the fidelity study wants it.
 struct ArmSetup {
+  std::string cell = "default";  // of models/cells
   double mass_kg = 4.0;
   double inertia_kg_m2 = 0.0;  // 0: the orientation is held
   double period_s = 1e-3;
@@ -32,7 +36,8 @@ struct ArmSetup {
   bool looks_ahead = false;      // --lookahead auto
   double settling_s = 2.0;       // before what is returned
   double duration_s = 10.0;      // of what is returned
-  std::vector<ArmSine> sines{};  // of the hand's intention, along x, or about z
+  std::vector<ArmSine> sines{};  // of the hand's intention
+  Eigen::Index axis = 0;         // of W, along which it moves or about which it turns: 0 to 2
 
   [[nodiscard]] bool turns() const noexcept { return inertia_kg_m2 > 0.0; }
 };

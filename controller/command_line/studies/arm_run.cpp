@@ -14,6 +14,7 @@ namespace {
 
 PreparedSession session_of(const studies::ArmSetup& setup) {
   RunOptions options;
+  options.cell = shipped_file("models/cells/" + setup.cell + ".yaml");
   options.mass_kg = setup.mass_kg;
   options.period_s = setup.period_s;
   options.duration_s = setup.settling_s + setup.duration_s;
@@ -33,13 +34,14 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
     // Leans on the wall, which is 0.2 m away, by 30 mm.
     session.hand.waypoints = {{0.0, {0.0, 0.0, 0.0}}, {2.0, {0.23, 0.0, 0.0}}};
   }
+  const models::Vec3 along = models::Vec3::Unit(setup.axis);
   for (std::size_t i = 0; i < setup.sines.size(); ++i) {
     // By turns with and against each other: at first the hand rests where the tool is.
     session.hand.multisine.push_back({.frequency_Hz = setup.sines[i].frequency_Hz,
                                       .amplitude_m = turns ? 0.0 : setup.sines[i].amplitude,
                                       .amplitude_rad = turns ? setup.sines[i].amplitude : 0.0,
                                       .phase_rad = i % 2 == 0 ? 0.0 : std::numbers::pi,
-                                      .direction = {turns ? 0.0 : 1.0, 0.0, turns ? 1.0 : 0.0}});
+                                      .direction = {along.x(), along.y(), along.z()}});
   }
   for (description::DriveDescription& drive : session.cell.drives) {
     drive.position_bandwidth_Hz *= setup.drive_factor;

@@ -173,6 +173,24 @@ TEST(FeltMassCurve, SeesADelayGrowWithFrequency) {
   EXPECT_EQ(band_within_Hz(points, 8.0, 0.25), 0.0);
 }
 
+// 4 kg along x, 6 along y, both moved; along z the tool gives way a little to what happens along the others.
+TEST(FeltMassCurve, TellsDirectionsApart) {
+  FeltMassCurve curve(period_s);
+  for (int k = 0; k < 30000; ++k) {
+    const double w = 2.0 * std::numbers::pi * 2.0, t = k * period_s;
+    const double a = std::sin(w * t), b = std::cos(w * t);
+    curve.add(-w * w * 1e-3 * Vec3(4.0 * a, 6.0 * b, 50.0 * 0.3 * a), 1e-3 * Vec3(a, b, 0.3 * a));
+  }
+  const auto mass = [&](std::size_t axis) {
+    const auto points = curve.points_along(axis);
+    const auto at = std::find_if(points.begin(), points.end(), [](const auto& p) { return p.frequency_Hz > 1.9; });
+    return at == points.end() ? 0.0 : at->mass_kg.real();
+  };
+  EXPECT_NEAR(mass(0), 4.0, 1e-3);
+  EXPECT_NEAR(mass(1), 6.0, 1e-3);
+  EXPECT_TRUE(curve.points_along(2).empty());
+}
+
 // As where a tool hangs loose in a hand that leads its place: nothing was felt, not nothing.
 TEST(ApparentMass, SaysNothingOfWhatMovesWithoutAHand) {
   ApparentMass estimator(period_s);
