@@ -247,6 +247,13 @@ std::string session_message(const Moment& moment) {
   return json.end().take();
 }
 
+Pose proxy_pose(const controller::CycleRecord& record) {
+  const auto& [x, y, z, w] = record.proxy_q_W;
+  Pose X = at(controller::vec3(record.proxy_W_m));
+  X.linear() = Eigen::Quaterniond(w, x, y, z).toRotationMatrix();
+  return X;
+}
+
 std::string pose_message(std::int64_t time_ns, const Pose& X) {
   JsonText json = begin_message(time_ns);
   put(json.add("frame_id", "W").name("pose"), X);
@@ -266,7 +273,7 @@ std::string SessionMessages::message(Topic topic, const Moment& moment, std::spa
       return pose_message(record.time_ns, X);
     }
     case Topic::proxy:
-      return pose_message(record.time_ns, at(controller::vec3(record.proxy_W_m)));
+      return pose_message(record.time_ns, proxy_pose(record));
     case Topic::wrench:
       return wrench_message(record);
     case Topic::contact:
