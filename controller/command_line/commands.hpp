@@ -41,6 +41,7 @@ struct ReplayOptions {
 
 struct SignalsOptions {
   std::filesystem::path folder;
+  bool contacts = false;  // the table of contacts instead
 };
 
 struct ScanOptions {

@@ -544,9 +544,10 @@ class Commands {
                            [this] { return replay_command(replay_); });
     replay->add_option("folder", replay_.folder, "folder of --record, or of a black box")->required();
     replay->add_flag("--json", replay_.json, "print the result as one JSON object");
-    add("signals", "the signals of a record as text, as in signals.csv", [this] { return signals_command(signals_); })
-        ->add_option("folder", signals_.folder, "folder of --record")
-        ->required();
+    CLI::App* signals = add("signals", "the signals of a record as text, as in signals.csv",
+                            [this] { return signals_command(signals_); });
+    signals->add_option("folder", signals_.folder, "folder of --record")->required();
+    signals->add_flag("--contacts", signals_.contacts, "its contacts instead, as in contacts.csv");
     CLI::App* check = add("check", "whether cell, scene, hand, sensor and other files are fine. Status 2: one isn't",
                           [this] { return check_command(check_); });
     check->add_option("files", check_.files, "files to check")->required();

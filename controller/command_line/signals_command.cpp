@@ -45,7 +45,8 @@ void print_table(const fs::path& file) {
 }  // namespace
 
 int signals_command(const SignalsOptions& options) {
-  const fs::path table = options.folder / "signals.bin", text = options.folder / "signals.csv";
+  const std::string name = options.contacts ? "contacts" : "signals";
+  const fs::path table = options.folder / (name + ".bin"), text = options.folder / (name + ".csv");
   std::error_code error;
   if (fs::exists(table, error)) {
     print_table(table);
@@ -53,7 +54,7 @@ int signals_command(const SignalsOptions& options) {
     print_text(text);
   } else {
     throw SetupError({.file = options.folder.string(),
-                      .found = "neither signals.bin nor signals.csv",
+                      .found = "neither " + name + ".bin nor " + name + ".csv",
                       .expected = "the folder of a record"});
   }
   return fine;

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "controller/signals/contact_columns.hpp"
 #include "fieldbus/can/candump_log.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -20,10 +21,11 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t buffer_bytes = 1 << 16;
 // All files that a session's folder may hold, which a later session replaces.
-constexpr const char* file_names[] = {"signals.csv",    "signals.bin",    "columns.json", "frames.log",  "session.mcap",
-                                      "effective.yaml", "effective.json", "summary.json", "timing.json", "plot.svg",
-                                      "plot.png",       "cell.yaml",      "scene.yaml",   "hand.yaml",   "sensor.yaml",
-                                      "arm.urdf",       "reason.txt"};
+constexpr const char* file_names[] = {"signals.csv",    "signals.bin",    "columns.json", "frames.log",
+                                      "session.mcap",   "contacts.csv",   "contacts.bin", "contact_columns.json",
+                                      "effective.yaml", "effective.json", "summary.json", "timing.json",
+                                      "plot.svg",       "plot.png",       "cell.yaml",    "scene.yaml",
+                                      "hand.yaml",      "sensor.yaml",    "arm.urdf",     "reason.txt"};
 
 bool is_ours(std::string_view name) {
   return std::find(std::begin(file_names), std::end(file_names), name) != std::end(file_names);
@@ -88,14 +90,18 @@ SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::stri
   for (const char* name : {"replay", "black-box", "numpy"}) fs::remove_all(folder_ / name, error);
   open(frames_, "frames.log");
   const std::vector<std::string> axes{axis_names.begin(), axis_names.begin() + static_cast<std::ptrdiff_t>(axes_)};
+  const std::vector<SignalColumn> columns = signal_columns(axes, with_truth_);
   if (form == SignalsForm::binary) {
-    table_.emplace(folder_ / "signals.bin", signal_columns(axes, with_truth_));
-    if (table_->error() != 0) fail("signals.bin", std::strerror(table_->error()));
+    open(table_, "signals.bin", columns);
+    open(contact_table_, "contacts.bin", contact_columns());
   } else {
     open(signals_, "signals.csv");
-    signals_.buffer = signals_header(axes, with_truth_) + "\n";
+    signals_.buffer = header_of(columns) + "\n";
+    open(contacts_, "contacts.csv");
+    contacts_.buffer = header_of(contact_columns()) + "\n";
   }
-  write_file("columns.json", columns_json(axes, with_truth_));
+  write_file("columns.json", json_of(columns));
+  write_file("contact_columns.json", json_of(contact_columns()));
 }
 
 void SessionWriter::fail(const std::string& name, const std::string& found) const {
@@ -126,11 +132,37 @@ void SessionWriter::close(File& file) {
   if (!file.stream) fail(file.name, errno != 0 ? std::strerror(errno) : "a file that couldn't be written whole");
 }
 
+void SessionWriter::open(std::optional<SignalTableWriter>& table, const char* name,
+                         const std::vector<SignalColumn>& columns) {
+  table.emplace(folder_ / name, columns);
+  if (table->error() != 0) fail(name, std::strerror(table->error()));
+}
+
+void SessionWriter::close(std::optional<SignalTableWriter>& table, const char* name) const {
+  if (!table) return;
+  table->finish();
+  if (table->error() != 0) fail(name, std::strerror(table->error()));
+}
+
 void SessionWriter::add(const CycleRecord& record, const DerivedSignals& derived) {
-  if (table_) return table_->add(record, axes_, with_truth_, derived);
+  for (std::size_t i = 0; i < record.recorded_contacts(); ++i) add_contact(record, i);
+  if (table_) {
+    store_signals(table_->row(), SignalTableWriter::apart, record, axes_, with_truth_, derived);
+    return table_->end_row();
+  }
   append_signals(signals_.buffer, record, axes_, with_truth_, derived);
   signals_.buffer += '\n';
   if (signals_.buffer.size() >= buffer_bytes) flush(signals_);
+}
+
+void SessionWriter::add_contact(const CycleRecord& record, std::size_t index) {
+  if (contact_table_) {
+    store_contact(contact_table_->row(), SignalTableWriter::apart, record, index);
+    return contact_table_->end_row();
+  }
+  append_contact(contacts_.buffer, record, index);
+  contacts_.buffer += '\n';
+  if (contacts_.buffer.size() >= buffer_bytes) flush(contacts_);
 }
 
 void SessionWriter::add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
@@ -148,11 +180,10 @@ void SessionWriter::write_file(std::string_view name, std::string_view text) {
 }
 
 void SessionWriter::finish(const Summary& summary) {
-  if (table_) {
-    table_->finish();
-    if (table_->error() != 0) fail("signals.bin", std::strerror(table_->error()));
-  }
+  close(table_, "signals.bin");
+  close(contact_table_, "contacts.bin");
   close(signals_);
+  close(contacts_);
   close(frames_);
   write_file("summary.json", repeatable_json(summary));
   write_file("timing.json", timing_json(summary));

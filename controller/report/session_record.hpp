@@ -4,6 +4,8 @@
 //                    numbers are the shortest that read back to the same double
 //   signals.bin      the same in its place, where that is wanted (signals/signal_table.hpp)
 //   columns.json     unit, frame and meaning of each of them
+//   contacts.csv     a row for each contact of each cycle (signals/contact_columns.hpp), or contacts.bin in its place;
+//                    contact_columns.json has what they mean
 //   session.mcap     the same session for other tools (messages/mcap_writer.hpp)
 //   frames.log       every frame on every bus, as `candump -L` writes them, so canplayer and log2asc read it
 //   effective.yaml   what the session ran with, every default filled in (and other configuration files by their names)
@@ -79,14 +81,17 @@ class SessionWriter {
   void open(File& file, const char* name);
   void flush(File& file);
   void close(File& file);
+  void open(std::optional<SignalTableWriter>& table, const char* name, const std::vector<SignalColumn>& columns);
+  void close(std::optional<SignalTableWriter>& table, const char* name) const;
+  void add_contact(const CycleRecord& record, std::size_t index);
   [[noreturn]] void fail(const std::string& name, const std::string& found) const;
 
   std::filesystem::path folder_;
   Lock lock_;
   std::size_t axes_;
   bool with_truth_;
-  File signals_, frames_;
-  std::optional<SignalTableWriter> table_;  // in the place of signals_
+  File signals_, contacts_, frames_;
+  std::optional<SignalTableWriter> table_, contact_table_;  // in the place of signals_ and contacts_
 };
 
 }  // namespace proxarm::controller

@@ -28,7 +28,8 @@ static_assert(std::endian::native == std::endian::little, "signals.bin is writte
 constexpr std::string_view magic = "PXSIGNAL";
 constexpr std::uint32_t version = 1;
 constexpr std::size_t page_bytes = 4096;
-constexpr std::size_t rows_of_block = page_bytes / sizeof(double);
+constexpr std::size_t rows_of_block = SignalTableWriter::apart;
+static_assert(rows_of_block == page_bytes / sizeof(double));
 constexpr std::size_t rows_at_once = 64;  // written; as many as signals.csv's buffer holds
 constexpr std::size_t json_begins_at = 24;
 constexpr std::array<std::pair<Form, const char*>, 5> forms{{{Form::number, "number"},
@@ -124,9 +125,7 @@ void SignalTableWriter::write_block() {
   write(block_.data(), column_bytes, begins_at_);
 }
 
-void SignalTableWriter::add(const CycleRecord& record, std::size_t axes, bool with_truth,
-                            const DerivedSignals& derived) {
-  store_signals(block_.data() + rows_, rows_of_block, record, axes, with_truth, derived);
+void SignalTableWriter::end_row() {
   ++rows_;
   if (rows_ % rows_at_once == 0) write_block();
   if (rows_ < rows_of_block) return;

@@ -1,5 +1,5 @@
-// signals.bin: a record's signals as numbers, column by column, so that a program maps the file into memory and has any
-// column of an hour in some milliseconds (docs/files.md). All is little-endian.
+// signals.bin, contacts.bin: tables of a record as numbers, column by column, so that a program maps the file into
+// memory and has any column of an hour in some milliseconds (docs/files.md). All is little-endian.
 //
 //   byte  0   "PXSIGNAL"
 //         8   u32, version: 1
@@ -33,8 +33,10 @@ class SignalTableWriter {
   SignalTableWriter& operator=(const SignalTableWriter&) = delete;
   ~SignalTableWriter();
 
-  // Precondition: axes and truth are those of the columns.
-  void add(const CycleRecord& record, std::size_t axes, bool with_truth, const DerivedSignals& derived);
+  // A row: its values go to row(), each `apart` places behind the one before; end_row() adds it.
+  static constexpr std::size_t apart = 512;
+  [[nodiscard]] double* row() noexcept { return block_.data() + rows_; }
+  void end_row();
   // Writes what is left, and closes the file.
   void finish();
   // errno of the first thing that went wrong with the file; 0: nothing.

@@ -74,6 +74,13 @@ class BinaryRecords(ProgramTest):
                                          (row[name] if float(row[name]) == value else value), name)
                 self.assertEqual(self.call("signals", numbers).out, (text / "signals.csv").read_text())
                 self.assertEqual(self.call("signals", text).out, (text / "signals.csv").read_text())
+                contacts = (text / "contacts.csv").read_text()
+                for folder in (text, numbers):
+                    self.assertEqual(self.call("signals", folder, "--contacts").out, contacts)
+                    self.assertEqual((folder / "contact_columns.json").read_text(), (text / "contact_columns.json").read_text())
+                self.assertEqual([column["name"] for column in json.loads((text / "contact_columns.json").read_text())],
+                                 contacts.split("\n")[0].split(","))
+                self.assertEqual(set(os.listdir(numbers)) - set(os.listdir(text)), {"signals.bin", "contacts.bin"})
                 self.assertEqual(self.call("replay", numbers).status, 0)
 
     def test_a_cut_file_has_the_rows_of_its_whole_blocks(self):

@@ -114,6 +114,29 @@ class Sessions(ProgramTest):
         for name in signals:
             numpy.testing.assert_array_equal(saved[name], signals[name], name)
 
+    def test_contacts_are_the_records(self):
+        """A row for each contact of each cycle, from either form and from a session in Python."""
+        scene, hand = SOURCE / "scenes/valve_key.yaml", SOURCE / "sim/hands/wrench.yaml"
+        for form in ("csv", "binary"):
+            self.call("run", "--no-plot", "--record", form, "--signals", form, "--duration", "3s", "--scene", scene, "--hand", hand,
+                      "--inertia", "0.05")
+            contacts = proxarm.load(self.folder / form).contacts
+            with open(self.folder / "csv" / "contacts.csv", newline="") as file:
+                rows = list(csv.DictReader(file))
+            self.assertGreater(len(rows), 1000)
+            self.assertEqual(list(contacts), list(rows[0]))
+            self.assertEqual(list(contacts["state"]), [row["state"] for row in rows])
+            for name in set(contacts) - {"state"}:
+                self.assertEqual(list(contacts[name]), [float(row[name]) for row in rows], name)
+            self.assertEqual(contacts.vector("point_W_m").shape, (len(rows), 3))
+        (self.folder / "csv" / "contact_columns.json").unlink()
+        with self.assertRaisesRegex(proxarm.SetupError, "contact_columns.json"):
+            proxarm.load(self.folder / "csv").contacts
+        result = proxarm.Session(scene=SOURCE / "scenes/wall.yaml", duration=5).run()
+        touching = result.signals["contacts"] > 0
+        self.assertEqual(list(result.contacts["cycle"]), list(result.signals["cycle"][touching]))
+        self.assertTrue((result.contacts.vector("force_W_N") == result.signals.vector("contact_force_W_N")[touching]).all())
+
     def test_a_long_records_columns_are_kept_until_it_changes(self):
         record = self.folder / "record"
         words = ("--duration", "1s", "--record", record)

@@ -203,12 +203,18 @@ class WebSocket:
             if isinstance(message, str) and name in (value := json.loads(message)):
                 return value[name]
 
-    def receive_moment(self, fields):
-        """The fields of the next moment, by their names."""
+    def receive_moment(self, fields, contact_fields=None):
+        """The fields of the next moment, by their names; with contact_fields those of its contacts as "touches"."""
         while True:
             message = self.receive()
             if isinstance(message, bytes) and struct.unpack_from("<d", message)[0] == 1.0:
-                return dict(zip(fields, struct.unpack_from(f"<{len(fields)}d", message, 8)))
+                moment = dict(zip(fields, struct.unpack_from(f"<{len(fields)}d", message, 8)))
+                if contact_fields:
+                    at, width = 8 * (1 + len(fields)), len(contact_fields)
+                    count = int(struct.unpack_from("<d", message, at)[0])
+                    numbers = struct.unpack_from(f"<{count * width}d", message, at + 8)
+                    moment["touches"] = [dict(zip(contact_fields, numbers[i:])) for i in range(0, len(numbers), width)]
+                return moment
 
     def is_closed(self, within_s=PATIENCE_S):
         """Whether the other side ends it in this time."""

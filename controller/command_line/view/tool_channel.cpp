@@ -29,7 +29,8 @@ std::uint32_t channel_of(Topic topic) { return static_cast<std::uint32_t>(topic)
 
 // What the arm alone has nothing to say of.
 bool is_of_controller(Topic topic) {
-  return topic == Topic::proxy || topic == Topic::contact || topic == Topic::session;
+  return topic == Topic::proxy || topic == Topic::contact || topic == Topic::session || topic == Topic::contacts ||
+         topic == Topic::contact_arrows;
 }
 
 json channels(bool arm_alone) {

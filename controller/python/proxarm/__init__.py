@@ -69,18 +69,29 @@ class Signals(collections.abc.Mapping):
 
 
 class Result:
-    """What a simulated session gives: `summary`, a dict as `proxarm run --json` prints it, and its `signals`."""
+    """What a simulated session gives: `summary`, a dict as `proxarm run --json` prints it, its `signals`, a row for each
+    cycle, and its `contacts`, a row for each contact of each cycle (docs/files.md), both as Signals."""
 
-    def __init__(self, summary, signals):
-        self.summary, self.signals = summary, signals
+    def __init__(self, summary, signals, contacts):
+        self.summary, self.signals, self.contacts = summary, signals, contacts
 
 
 class Record(Result):
     """A session that was kept by `proxarm run --record`."""
 
-    def __init__(self, summary, signals, meanings):
-        super().__init__(summary, signals)
+    def __init__(self, folder, summary, signals, meanings):
+        self.folder, self.summary, self.signals = folder, summary, signals
         self.meanings = meanings  # of each column: unit, frame and meaning
+
+    @functools.cached_property
+    def contacts(self):
+        """Read when they are first asked for. SetupError: a record of a version that kept none."""
+        described = _json(self.folder / "contact_columns.json")
+        names = [column["name"] for column in described]
+        if (table := self.folder / "contacts.bin").exists():
+            return _Table(table).signals(names)
+        text = [column["name"] for column in described if "unit" not in column]
+        return Signals(_read_table(str(self.folder / "contacts.csv"), names, text))
 
 
 class Session:
@@ -98,8 +109,8 @@ class Session:
     def run(self, world=None, hand=None):
         """world(kappa, p, q) -> where the proxy goes, in place of the scene; hand(time_s, position, velocity) -> N, in
         place of the hand's motion and grip. All in W, three numbers each. What either raises comes out of here."""
-        summary, columns = _Session(*self._options).run(world, hand)
-        return Result(json.loads(summary), Signals(columns))
+        summary, columns, contacts = _Session(*self._options).run(world, hand)
+        return Result(json.loads(summary), Signals(columns), Signals(contacts))
 
 
 KEEP_FROM_BYTES = 100_000_000  # of a signals.csv that takes about half a second to read
@@ -117,7 +128,7 @@ def load(folder, columns=None, keep=True):
     wanted = list(columns or (column["name"] for column in described))
     text = [column["name"] for column in described if "unit" not in column]
     signals = _load_signals(folder, wanted, text, keep)
-    return Record(summary, signals, {column.pop("name"): column for column in described})
+    return Record(folder, summary, signals, {column.pop("name"): column for column in described})
 
 
 class _Table:

@@ -30,6 +30,13 @@ void McapRecord::write(Topic topic, const Moment& moment) {
               messages_.message(topic, moment, links_, objects_));
 }
 
+// Nothing where there are none, but once where there have been some.
+void McapRecord::write_contacts(Topic topic, const Moment& moment, bool& told) {
+  const bool some = moment.record.recorded_contacts() > 0;
+  if (some || told) write(topic, moment);
+  told = some;
+}
+
 void McapRecord::drain(const controller::BoxReader& box) {
   for (const std::uint64_t end = box.cycles(); !waiting_.empty() && waiting_.front().cycle < end;
        waiting_.pop_front()) {
@@ -46,7 +53,9 @@ void McapRecord::write(const controller::BoxCycle& cycle) {
   builder_.add(cycle.record, rendered_s);
   const Moment moment = builder_.take();
   for (const Topic topic : {Topic::wrench, Topic::contact, Topic::joint_states}) write(topic, moment);
+  write_contacts(Topic::contacts, moment, told_contacts_);
   if (cycles_++ % cycles_per_pose != 0) return;
+  write_contacts(Topic::contact_arrows, moment, told_arrows_);
   stage_.place(moment.record, rendered_s, links_, objects_);
   if (cycles_ == 1 || !same(objects_, drawn_)) {
     drawn_ = objects_;

@@ -1,5 +1,6 @@
-// Writes session.mcap of a record: forces, contacts and joints of every cycle, poses and transforms of every tenth, and
-// the scene when something in it moves. It is written while the session runs, outside of the cycle.
+// Writes session.mcap of a record: forces and joints of every cycle, contacts where there are some, poses and
+// transforms of every tenth, and the scene when something in it moves. It is written while the session runs, outside of
+// the cycle.
 #pragma once
 
 #include <array>
@@ -27,6 +28,7 @@ class McapRecord {
  private:
   void write(const controller::BoxCycle& cycle);
   void write(Topic topic, const Moment& moment);
+  void write_contacts(Topic topic, const Moment& moment, bool& told);
 
   Stage& stage_;
   SessionMessages messages_;
@@ -36,6 +38,7 @@ class McapRecord {
   std::vector<models::Pose> links_, objects_, drawn_;
   std::deque<controller::CycleRecord> waiting_;  // for the box to have the whole cycle
   std::uint64_t cycles_ = 0;
+  bool told_contacts_ = false, told_arrows_ = false;  // a message that names some is the last one
   controller::BoxCycle cycle_;
 };
 

@@ -52,6 +52,7 @@ RecordedSession::RecordedSession(const std::filesystem::path& folder, Stage& sta
     : stage_(stage),
       log_(folder / controller::replay_folder / "cycles.bin"),
       signals_(folder, axis_names(stage)),
+      contacts_(folder),
       first_cycle_(signals_.row(0).cycle) {
   read_fault(folder);
   find_events();
@@ -152,6 +153,7 @@ double RecordedSession::time_s(std::size_t index) const {
 Moment RecordedSession::moment(std::size_t index) const {
   Moment moment;
   moment.record = signals_.row(index);
+  contacts_.complete(moment.record);
   moment.handle_mass_kg = stage_.handle_mass_kg();
   moment.rendered_s = 1e-9 * static_cast<double>(rendered_ns_[index]);
   const std::size_t before = index > 0 ? index - 1 : index;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/record/replay_log.hpp"
+#include "controller/view/sources/contacts_file.hpp"
 #include "controller/view/sources/signals_file.hpp"
 #include "controller/view/stage/stage.hpp"
 
@@ -56,6 +57,7 @@ class RecordedSession {
   Stage& stage_;
   controller::ReplayReader log_;
   SignalsFile signals_;
+  ContactsFile contacts_;
   std::uint64_t first_cycle_ = 0;               // number of the first row's cycle
   std::vector<std::int64_t> rendered_ns_;       // time rendered before each cycle, since the record's beginning
   std::vector<std::streamoff> positions_;       // of each cycle in the log, from its first one on

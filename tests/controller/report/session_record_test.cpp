@@ -59,7 +59,7 @@ TEST(SessionRecord, EveryColumnHasAName) {
 }
 
 TEST(SessionRecord, EveryColumnHasAMeaning) {
-  const nlohmann::json columns = nlohmann::json::parse(columns_json(six_axes, true));
+  const nlohmann::json columns = nlohmann::json::parse(json_of(signal_columns(six_axes, true)));
   std::string header;
   for (const nlohmann::json& column : columns) {
     header += (header.empty() ? "" : ",") + column.at("name").get<std::string>();
@@ -117,12 +117,13 @@ TEST(SessionRecord, NumbersOfATableAreThoseOfTheText) {
     for (Triple* triple : {&r.force_W_N, &r.tool_W_m, &r.hand_force_W_N}) {
       for (double& value : *triple) value = std::bit_cast<double>(generator());
     }
-    r.others[1].object = static_cast<std::int32_t>(generator());
+    r.contacts[2].object = static_cast<std::int32_t>(generator());
     DerivedSignals derived;
     derived.torques = k % 2 == 0;
     derived.target_Nm[2] = std::bit_cast<double>(generator());
     append_signals(expected.emplace_back(), r, 6, true, derived);
-    writer.add(r, 6, true, derived);
+    store_signals(writer.row(), SignalTableWriter::apart, r, 6, true, derived);
+    writer.end_row();
     if (k % 97 != 0) continue;
     // What a session that is killed now leaves: 64 rows at a time, each whole.
     const SignalTable table(folder / "signals.bin");
