@@ -123,7 +123,7 @@ void RecordedSession::index_frames() {
   const bool driven = std::any_of(stage_.scene().objects.begin(), stage_.scene().objects.end(),
                                   [](const scenes::Object& o) { return o.motion && o.motion->driven; });
   if (driven) return follow_driven();
-  for (std::streamoff at = log_.position(); log_.skip(); at = log_.position()) positions_.push_back(at);
+  for (controller::ReplayPlace at = log_.position(); log_.skip(); at = log_.position()) positions_.push_back(at);
 }
 
 // Objects are moved cycle by cycle, as they were in the session.
@@ -132,7 +132,7 @@ void RecordedSession::follow_driven() {
   std::vector<controller::BoxFrame> frames;
   const std::size_t objects = stage_.scene().objects.size();
   driven_m_.assign(size() * objects, {});
-  for (std::streamoff at = log_.position(); log_.next(cycle, frames); at = log_.position()) {
+  for (controller::ReplayPlace at = log_.position(); log_.next(cycle, frames); at = log_.position()) {
     positions_.push_back(at);
     const std::uint64_t index = cycle.record.cycle - first_cycle_;
     if (cycle.record.cycle < first_cycle_ || index >= size()) continue;

@@ -58,10 +58,10 @@ class RecordedSession {
   controller::ReplayReader log_;
   SignalsFile signals_;
   ContactsFile contacts_;
-  std::uint64_t first_cycle_ = 0;               // number of the first row's cycle
-  std::vector<std::int64_t> rendered_ns_;       // time rendered before each cycle, since the record's beginning
-  std::vector<std::streamoff> positions_;       // of each cycle in the log, from its first one on
-  std::vector<std::array<float, 3>> driven_m_;  // of each cycle and object; empty if no object is driven
+  std::uint64_t first_cycle_ = 0;                   // number of the first row's cycle
+  std::vector<std::int64_t> rendered_ns_;           // time rendered before each cycle, since the record's beginning
+  std::vector<controller::ReplayPlace> positions_;  // of each cycle in the log, from its first one on
+  std::vector<std::array<float, 3>> driven_m_;      // of each cycle and object; empty if no object is driven
   std::vector<RecordedEvent> events_;
   std::size_t opening_ = 0, fault_at_ = 0;
   std::uint64_t fault_cycle_ = 0;
