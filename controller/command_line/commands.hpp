@@ -41,7 +41,7 @@ struct ReplayOptions {
 
 struct SignalsOptions {
   std::filesystem::path folder;
-  bool contacts = false;  // the table of contacts instead
+  bool contacts = false, frames = false;  // the table of contacts, or the frames, instead
 };
 
 struct ScanOptions {

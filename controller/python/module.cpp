@@ -23,6 +23,7 @@
 #include "controller/signals/derived_signals.hpp"
 #include "controller/signals/signal_columns.hpp"
 #include "models/base/quantity.hpp"
+#include "models/packed/packed.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
 
@@ -342,6 +343,10 @@ PYBIND11_MODULE(_proxarm, module) {
       .def_property_readonly("name", &World::name, "Of the scene.")
       .def_property_readonly("objects", &World::objects, "Their names; contacts have their indices.")
       .def_property_readonly("dimensions", &World::dimensions, "Of the space in which it is touched: 1, 2 or 3.");
+  module.def("_unpacked", [](const py::bytes& frame, std::size_t bytes) -> std::optional<py::bytes> {
+    const auto found = models::unpacked(std::string_view(frame), bytes);
+    return found ? std::optional<py::bytes>(*found) : std::nullopt;
+  });
   module.def(
       "_bare", [](double, py::handle, py::handle) {}, "What a call costs that does nothing.");
 

@@ -13,6 +13,7 @@
 #include "controller/signals/contact_columns.hpp"
 #include "fieldbus/can/candump_log.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/packed/packed.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -20,12 +21,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t buffer_bytes = 1 << 16;
+constexpr std::size_t packed_at_once = 1 << 18;  // of text: a third of a second of frames, which then take a ninth
 // All files that a session's folder may hold, which a later session replaces.
-constexpr const char* file_names[] = {"signals.csv",    "signals.bin",    "columns.json", "frames.log",
-                                      "session.mcap",   "contacts.csv",   "contacts.bin", "contact_columns.json",
-                                      "effective.yaml", "effective.json", "summary.json", "timing.json",
-                                      "plot.svg",       "plot.png",       "cell.yaml",    "scene.yaml",
-                                      "hand.yaml",      "sensor.yaml",    "arm.urdf",     "reason.txt"};
+constexpr const char* file_names[] = {"signals.csv",    "signals.bin",    "columns.json",
+                                      "frames.log",     "frames.log.zst", "session.mcap",
+                                      "contacts.csv",   "contacts.bin",   "contact_columns.json",
+                                      "effective.yaml", "effective.json", "summary.json",
+                                      "timing.json",    "plot.svg",       "plot.png",
+                                      "cell.yaml",      "scene.yaml",     "hand.yaml",
+                                      "sensor.yaml",    "arm.urdf",       "reason.txt"};
 
 bool is_ours(std::string_view name) {
   return std::find(std::begin(file_names), std::end(file_names), name) != std::end(file_names);
@@ -71,7 +75,7 @@ SessionWriter::Lock::~Lock() {
 
 SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::string>& axis_names, bool with_truth,
                              SignalsForm form)
-    : folder_(folder), axes_(std::min(axis_names.size(), max_axes)), with_truth_(with_truth) {
+    : folder_(folder), axes_(std::min(axis_names.size(), max_axes)), with_truth_(with_truth), form_(form) {
   std::error_code error;
   if (fs::exists(folder_, error) && !fs::is_directory(folder_, error)) {
     fail("", "a file that is no folder");
@@ -88,10 +92,11 @@ SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::stri
   if (error) fail("", error.message());
   for (const char* name : file_names) fs::remove(folder_ / name, error);
   for (const char* name : {"replay", "black-box", "numpy"}) fs::remove_all(folder_ / name, error);
-  open(frames_, "frames.log");
+  frames_.packed = form == SignalsForm::packed;
+  open(frames_, frames_.packed ? "frames.log.zst" : "frames.log");
   const std::vector<std::string> axes{axis_names.begin(), axis_names.begin() + static_cast<std::ptrdiff_t>(axes_)};
   const std::vector<SignalColumn> columns = signal_columns(axes, with_truth_);
-  if (form == SignalsForm::binary) {
+  if (form != SignalsForm::csv) {
     open(table_, "signals.bin", columns);
     open(contact_table_, "contacts.bin", contact_columns());
   } else {
@@ -120,6 +125,7 @@ void SessionWriter::open(File& file, const char* name) {
 }
 
 void SessionWriter::flush(File& file) {
+  if (file.packed) file.buffer = models::packed(file.buffer);
   file.stream.write(file.buffer.data(), static_cast<std::streamsize>(file.buffer.size()));
   file.buffer.clear();
 }
@@ -134,7 +140,8 @@ void SessionWriter::close(File& file) {
 
 void SessionWriter::open(std::optional<SignalTableWriter>& table, const char* name,
                          const std::vector<SignalColumn>& columns) {
-  table.emplace(folder_ / name, columns);
+  const bool packed = form_ == SignalsForm::packed;
+  table.emplace(folder_ / name, columns, packed ? SignalTableWriter::Blocks::packed : SignalTableWriter::Blocks::plain);
   if (table->error() != 0) fail(name, std::strerror(table->error()));
 }
 
@@ -168,7 +175,7 @@ void SessionWriter::add_contact(const CycleRecord& record, std::size_t index) {
 void SessionWriter::add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
   fieldbus::CandumpLine line;
   frames_.buffer.append(line.data(), fieldbus::format_candump_line(line, time_ns, bus, frame));
-  if (frames_.buffer.size() >= buffer_bytes) flush(frames_);
+  if (frames_.buffer.size() >= (frames_.packed ? packed_at_once : buffer_bytes)) flush(frames_);
 }
 
 void SessionWriter::write_file(std::string_view name, std::string_view text) {

@@ -2,6 +2,8 @@
 
 #include <zstd.h>
 
+#include <memory>
+#include <new>
 #include <stdexcept>
 
 namespace proxarm::models {
@@ -20,6 +22,22 @@ std::optional<std::string> unpacked(std::string_view frame, std::size_t bytes) {
   const std::size_t size = ZSTD_decompress(out.data(), out.size(), frame.data(), frame.size());
   if (ZSTD_isError(size) != 0 || size != bytes) return std::nullopt;
   return out;
+}
+
+bool unpack(std::istream& frames, const std::function<bool(std::string_view)>& put) {
+  const std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)> stream(ZSTD_createDStream(), &ZSTD_freeDStream);
+  if (!stream) throw std::bad_alloc();
+  std::string in(ZSTD_DStreamInSize(), '\0'), out(ZSTD_DStreamOutSize(), '\0');
+  do {
+    frames.read(in.data(), static_cast<std::streamsize>(in.size()));
+    ZSTD_inBuffer from{in.data(), static_cast<std::size_t>(frames.gcount()), 0};
+    while (from.pos < from.size) {
+      ZSTD_outBuffer to{out.data(), out.size(), 0};
+      if (ZSTD_isError(ZSTD_decompressStream(stream.get(), &to, &from)) != 0) return false;
+      if (!put({out.data(), to.pos})) return true;
+    }
+  } while (frames);
+  return true;
 }
 
 }  // namespace proxarm::models

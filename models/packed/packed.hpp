@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
+#include <istream>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,5 +16,9 @@ namespace proxarm::models {
 // What was packed; none where it is damaged, or not of this size. Precondition: the caller bounds `bytes`, which are
 // allocated.
 [[nodiscard]] std::optional<std::string> unpacked(std::string_view frame, std::size_t bytes);
+
+// Unpacks all frames that follow each other, and hands on what they hold, piece by piece, until `put` returns false.
+// False where they are damaged; a last frame that is cut off counts as the end.
+bool unpack(std::istream& frames, const std::function<bool(std::string_view)>& put);
 
 }  // namespace proxarm::models

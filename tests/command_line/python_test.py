@@ -171,6 +171,30 @@ class Sessions(ProgramTest):
         (record / "numpy").write_text("no folder")
         numpy.testing.assert_array_equal(proxarm.load(record).signals["time_s"], whole["time_s"])
 
+    def test_packed_numbers_are_those_of_the_text(self):
+        for folder, form in (("text", "csv"), ("packed", "packed")):
+            self.call("run", "--no-plot", "--duration", "5s", "--fault", "axis_3:silent@4s", "--record", folder, "--signals", form)
+        text, packed = (proxarm.load(self.folder / folder) for folder in ("text", "packed"))
+        self.assertEqual(list(packed.signals), list(text.signals))
+        for name in text.signals:
+            numpy.testing.assert_array_equal(packed.signals[name], text.signals[name], name)
+        for name in text.contacts:
+            numpy.testing.assert_array_equal(packed.contacts[name], text.contacts[name], name)
+        chosen = proxarm.load(self.folder / "packed", columns=["phase", "tool_W_x_m"]).signals
+        numpy.testing.assert_array_equal(chosen["phase"], text.signals["phase"])
+        with self.assertRaisesRegex(proxarm.SetupError, '"torque"'):
+            proxarm.load(self.folder / "packed", columns=["torque"])
+        file = self.folder / "packed" / "signals.bin"
+        whole = file.read_bytes()
+        begin = int.from_bytes(whole[12:16], "little")
+        first = 4 + int.from_bytes(whole[begin:begin + 4], "little")
+        for end, rows in ((begin, 0), (begin + 3, 0), (begin + first - 1, 0), (begin + first, 512), (begin + first + 9, 512)):
+            file.write_bytes(whole[:end])
+            numpy.testing.assert_array_equal(proxarm.load(self.folder / "packed").signals["time_s"], text.signals["time_s"][:rows])
+        file.write_bytes(whole[:begin + 40] + b"damage" + whole[begin + 46:])
+        with self.assertRaisesRegex(proxarm.SetupError, "a block that is damaged"):
+            proxarm.load(self.folder / "packed")
+
     def test_numbers_in_columns_are_those_of_the_text(self):
         for folder, form in (("text", "csv"), ("numbers", "binary")):
             self.call("run", "--no-plot", "--duration", "5s", "--fault", "axis_3:silent@4s", "--record", folder, "--signals", form)
@@ -194,7 +218,7 @@ class Sessions(ProgramTest):
             file.write_bytes(whole[:begin + blocks * 4096 * columns + 4095])
             numpy.testing.assert_array_equal(proxarm.load(self.folder / "numbers").signals["time_s"],
                                              text.signals["time_s"][:512 * blocks])
-        for data, found in ((whole[:8] + b"\2" + whole[9:], "version 2"), (b"cycle,time_s\n0,0\n" * 9, "another kind"),
+        for data, found in ((whole[:8] + b"\3" + whole[9:], "version 3"), (b"cycle,time_s\n0,0\n" * 9, "another kind"),
                             (whole[:10], "another kind|cut off"), (whole[:4000], "cut off")):
             file.write_bytes(data)
             with self.subTest(found), self.assertRaisesRegex(proxarm.SetupError, found):

@@ -13,7 +13,7 @@ import struct
 import subprocess
 import time
 
-from harness import program
+from harness import as_text, program
 
 PATIENCE_S = 20 * (5 if os.environ.get("PROXARM_SLOW_BUILD") else 1)
 URL = re.compile(r"(http://127\.0\.0\.1:(\d+)/\?token=([0-9a-f]{64}))")
@@ -24,7 +24,7 @@ class Session:
 
     def __init__(self, folder, *arguments, env=None):
         self.begun = time.monotonic()
-        self.process = subprocess.Popen([program(), *map(str, arguments)], cwd=folder, stdin=subprocess.DEVNULL,
+        self.process = subprocess.Popen([program(), *as_text(arguments)], cwd=folder, stdin=subprocess.DEVNULL,
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env)
         self.said = ""
         while not (found := URL.search(self.said)):

@@ -86,9 +86,8 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
   if (options.record_dir.empty()) return;
-  const auto form = options.binary_signals ? controller::SignalsForm::binary : controller::SignalsForm::csv;
   writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, controller::joint_names(session.cell),
-                                                        with_truth, form);
+                                                        with_truth, options.signals);
   writer_->write_file("effective.yaml", effective_config(session));
 }
 

@@ -64,7 +64,7 @@ ContactsFile::ContactsFile(const std::filesystem::path& folder) {
   }
 }
 
-std::uint64_t ContactsFile::cycle_of(std::size_t row) const noexcept {
+std::uint64_t ContactsFile::cycle_of(std::size_t row) const {
   if (!table_) return text_->first(row);
   const double cycle = table_->value(row, 0);
   return cycle >= 0.0 && cycle < 9e15 ? static_cast<std::uint64_t>(cycle) : 0;

@@ -28,7 +28,7 @@ class ContactsFile {
   };
   [[nodiscard]] static Column column_named(std::string_view name);
   [[nodiscard]] std::size_t rows() const noexcept { return table_ ? table_->rows() : text_ ? text_->rows() : 0; }
-  [[nodiscard]] std::uint64_t cycle_of(std::size_t row) const noexcept;
+  [[nodiscard]] std::uint64_t cycle_of(std::size_t row) const;
   [[nodiscard]] controller::RecordedContact contact(std::size_t row) const;
 
   std::unique_ptr<controller::SignalTable> table_;

@@ -89,10 +89,12 @@ void RecordedSession::find_events() {
   };
   fault_at_ = size();
   rendered_ns_.reserve(size());
+  time_ns_.reserve(size());
   for (std::size_t i = 0; i < size(); ++i) {
     const CycleRecord record = signals_.row(i);
     if (i > 0 && last.phase == Phase::rendering) rendered += record.time_ns - last.time_ns;
     rendered_ns_.push_back(rendered);
+    time_ns_.push_back(record.time_ns);
     if (record.phase != last.phase) add(RecordedEvent::Kind::phase, i, record, phase_words(record.phase).words);
     if (record.contact != controller::ContactPhase::free) {
       if (record.time_ns - touched_ns >= apart_ns) add(RecordedEvent::Kind::contact, i, record, "touches");
@@ -146,9 +148,7 @@ void RecordedSession::follow_driven() {
   }
 }
 
-double RecordedSession::time_s(std::size_t index) const {
-  return 1e-9 * static_cast<double>(signals_.row(index).time_ns);
-}
+double RecordedSession::time_s(std::size_t index) const noexcept { return 1e-9 * static_cast<double>(time_ns_[index]); }
 
 Moment RecordedSession::moment(std::size_t index) const {
   Moment moment;

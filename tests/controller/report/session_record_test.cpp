@@ -107,7 +107,7 @@ TEST(SessionRecord, NumbersOfATableAreThoseOfTheText) {
   std::mt19937_64 generator(18);
   std::printf("seed 18\n");
   std::vector<std::string> expected;
-  SignalTableWriter writer(folder / "signals.bin", signal_columns(six_axes, true));
+  SignalTableWriter writer(folder / "signals.bin", signal_columns(six_axes, true), SignalTableWriter::Blocks::plain);
   for (std::uint64_t k = 0; k < 3000; ++k) {
     CycleRecord r = some_record(generator() >> 11);
     r.time_ns = static_cast<std::int64_t>(generator() >> (13 + generator() % 40));
@@ -147,7 +147,8 @@ TEST(SessionRecord, NumbersOfATableAreThoseOfTheText) {
 
 TEST(SessionRecord, ATableTellsOfAFullDisk) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  EXPECT_EQ(SignalTableWriter("/dev/full", signal_columns(six_axes, true)).error(), ENOSPC);
+  EXPECT_EQ(SignalTableWriter("/dev/full", signal_columns(six_axes, true), SignalTableWriter::Blocks::plain).error(),
+            ENOSPC);
 }
 
 // Written by hand in candump -L's format (can-utils, lib.c: "id#data", "id##flags data", "id#R", 8 digits when

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <sstream>
 
 namespace proxarm::models {
 namespace {
@@ -18,6 +19,36 @@ TEST(Packed, AnyBytesComeBack) {
 }
 
 TEST(Packed, WhatRepeatsBecomesSmaller) { EXPECT_LT(packed(std::string(100'000, 'x')).size(), 100U); }
+
+std::string text_in(const std::string& frames, bool& sound) {
+  std::istringstream in(frames);
+  std::string text;
+  sound = unpack(in, [&](std::string_view piece) {
+    text += piece;
+    return true;
+  });
+  return text;
+}
+
+TEST(Packed, FramesThatFollowEachOtherAreReadAsOneText) {
+  std::string frames, expected;
+  for (int i = 0; i < 300; ++i) {
+    const std::string piece(static_cast<std::size_t>(100 * i), static_cast<char>('a' + i % 26));
+    frames += packed(piece);
+    expected += piece;
+  }
+  bool sound = false;
+  EXPECT_EQ(text_in(frames, sound), expected);
+  EXPECT_TRUE(sound);
+  // Cut off anywhere: what comes out is a beginning of the text.
+  for (std::size_t cut = 1; cut < frames.size(); cut += 37) {
+    const std::string text = text_in(frames.substr(0, cut), sound);
+    ASSERT_TRUE(sound);
+    ASSERT_EQ(text, expected.substr(0, text.size()));
+  }
+  EXPECT_EQ(text_in("no frame", sound), "");
+  EXPECT_FALSE(sound);
+}
 
 TEST(Packed, DamageIsToldOrChangesOnlyTheBytes) {
   std::mt19937 generator(2);
