@@ -22,7 +22,8 @@ objects:
 """
 # Of a session: C and C++, MuJoCo and what it stands on, meshes, cells, Modbus, hashes. Nothing of a web server.
 LIBRARIES = {"ld-linux-x", "libc", "libm", "libgcc_s", "libstdc", "libmujoco", "libccd", "libqhull_r", "liblodepng",
-             "libtinyxml", "libassimp", "libdraco", "libminizip", "libz", "libyaml-cpp", "libmodbus", "libcrypto"}
+             "libtinyxml", "libassimp", "libdraco", "libminizip", "libz", "libyaml-cpp", "libmodbus", "libcrypto",
+             "libzstd"}
 
 
 def processes_of(pid):
