@@ -70,13 +70,13 @@ struct RunOptions {
   std::optional<Pace> pace;          // unset: virtual in-process, real time on an interface
   std::filesystem::path record_dir;  // empty: no record
   controller::SignalsForm signals = controller::SignalsForm::packed;  // of the record
-  std::vector<std::string> changes;                                // NAME=VALUE@TIME
-  std::vector<std::string> orders;                                 // ORDER@TIME
-  bool without_proof = false;                                      // real drives of a cell that isn't proven
-  std::string hardware;                                            // empty: simulations only; ask, checked
-  std::filesystem::path control;                                   // socket that takes changes; empty: none
-  std::filesystem::path black_box_dir;                             // empty: in the record, or proxarm-black-box
-  std::filesystem::path plot_file;                                 // empty: proxarm-run.svg, none with --json
+  std::vector<std::string> changes;                                   // NAME=VALUE@TIME
+  std::vector<std::string> orders;                                    // ORDER@TIME
+  bool without_proof = false;                                         // real drives of a cell that isn't proven
+  std::string hardware;                                               // empty: simulations only; ask, checked
+  std::filesystem::path control;                                      // socket that takes changes; empty: none
+  std::filesystem::path black_box_dir;                                // empty: in the record, or proxarm-black-box
+  std::filesystem::path plot_file;                                    // empty: proxarm-run.svg, none with --json
   bool plot = true;
   bool json = false;
   bool force_unstable = false;
