@@ -41,6 +41,7 @@ struct ReplayOptions {
 
 struct SignalsOptions {
   std::filesystem::path folder;
+  bool contacts = false, frames = false;  // the table of contacts, or the frames, instead
 };
 
 struct ScanOptions {

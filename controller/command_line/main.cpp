@@ -294,10 +294,16 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   record->type_name("DIR");
   app.add_option(
          "--signals",
-         choice<bool>("--signals", {{"csv", false}, {"binary", true}}, [&](bool is) { options.binary_signals = is; }),
-         "the record's rows as signals.csv (the default), or as numbers in columns, which load in no time: signals.bin "
-         "(`proxarm signals` makes text of it)")
-      ->type_name("csv|binary")
+         choice<controller::SignalsForm>("--signals",
+                                         {{"csv", controller::SignalsForm::csv},
+                                          {"binary", controller::SignalsForm::binary},
+                                          {"packed", controller::SignalsForm::packed}},
+                                         [&](controller::SignalsForm form) { options.signals = form; }),
+         "how the record keeps its rows: packed (the default: a quarter of the size, frames.log with them), binary "
+         "(signals.bin: numbers in columns, which load in no time) or csv (signals.csv); `proxarm signals` makes text "
+         "of "
+         "all")
+      ->type_name("packed|binary|csv")
       ->needs(record);
   app.add_option("--set", options.changes,
                  "change a parameter when so much time has been rendered (holds and stops don't count), such as "
@@ -544,9 +550,13 @@ class Commands {
                            [this] { return replay_command(replay_); });
     replay->add_option("folder", replay_.folder, "folder of --record, or of a black box")->required();
     replay->add_flag("--json", replay_.json, "print the result as one JSON object");
-    add("signals", "the signals of a record as text, as in signals.csv", [this] { return signals_command(signals_); })
-        ->add_option("folder", signals_.folder, "folder of --record")
-        ->required();
+    CLI::App* signals = add("signals", "the signals of a record as text, as in signals.csv",
+                            [this] { return signals_command(signals_); });
+    signals->add_option("folder", signals_.folder, "folder of --record")->required();
+    CLI::Option* contacts =
+        signals->add_flag("--contacts", signals_.contacts, "its contacts instead, as in contacts.csv");
+    signals->add_flag("--frames", signals_.frames, "the frames on its buses instead, as in frames.log")
+        ->excludes(contacts);
     CLI::App* check = add("check", "whether cell, scene, hand, sensor and other files are fine. Status 2: one isn't",
                           [this] { return check_command(check_); });
     check->add_option("files", check_.files, "files to check")->required();

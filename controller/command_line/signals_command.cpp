@@ -9,6 +9,7 @@
 #include "controller/command_line/entry/exit_status.hpp"
 #include "controller/signals/signal_table.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/packed/packed.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -42,18 +43,28 @@ void print_table(const fs::path& file) {
   print(text);
 }
 
+void print_packed(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (models::unpack(in, print)) return;
+  throw SetupError(
+      {.file = file.string(), .found = "frames that are damaged", .expected = "what a session has written"});
+}
+
 }  // namespace
 
 int signals_command(const SignalsOptions& options) {
-  const fs::path table = options.folder / "signals.bin", text = options.folder / "signals.csv";
+  const std::string name = options.frames ? "frames" : options.contacts ? "contacts" : "signals";
+  const std::string numbers = options.frames ? "frames.log.zst" : name + ".bin";
+  const std::string lines = options.frames ? "frames.log" : name + ".csv";
+  const fs::path table = options.folder / numbers, text = options.folder / lines;
   std::error_code error;
-  if (fs::exists(table, error)) {
-    print_table(table);
+  if (fs::is_regular_file(table, error)) {
+    options.frames ? print_packed(table) : print_table(table);
   } else if (fs::is_regular_file(text, error)) {
     print_text(text);
   } else {
     throw SetupError({.file = options.folder.string(),
-                      .found = "neither signals.bin nor signals.csv",
+                      .found = "neither " + numbers + " nor " + lines,
                       .expected = "the folder of a record"});
   }
   return fine;

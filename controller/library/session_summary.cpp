@@ -41,8 +41,11 @@ void complete(CycleRecord& record, const command_line::PreparedSession& session,
   if (session.rigid) return add_clearances(record, *session.rigid, rendered_ns);
   add_clearances(record, session.scene, rendered_ns);
   if (!session.impedance()) return;
-  if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session.scene.objects.size()) {
-    record.friction = session.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;
+  for (RecordedContact& contact : record.contacts) {
+    const auto object = static_cast<std::size_t>(contact.object);
+    if (contact.object >= 0 && object < session.scene.objects.size()) {
+      contact.friction = session.scene.objects[object].friction;
+    }
   }
 }
 

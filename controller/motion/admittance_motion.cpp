@@ -226,7 +226,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   state_.touches = step.contacts > 0;
   if (step.settled) state_.q_k2_W = state_.q_k1_W;
   record_world(step, cycle.record);
-  if (step.contacts > 0) state_.last_normal_W = step.normal_W;
+  if (step.contacts > 0) state_.last_normal_W = step.touches[0].normal_W;
   if (passivity_) record_passivity(step, cycle.record);
   cycle.record.set(RecordFlag::limit_orientation, parts_.tool->turning_limited());
   if (follow_proxy(cycle)) {

@@ -11,18 +11,22 @@ void record_world(const WorldStep& step, CycleRecord& record) noexcept {
   record.p_hat_W_m = triple(step.p_hat_W);
   record.contact_force_W_N = triple(step.f_W);
   record.contact_torque_W_Nm = triple(step.torque_W);
-  record.normal_W = triple(step.normal_W);
-  record.contact_object = step.object;
-  record.friction = step.friction;
-  static_assert(std::tuple_size_v<decltype(step.others)> == other_contacts);
-  for (std::size_t i = 0; i < other_contacts; ++i) {
-    const WorldStep::Contact& other = step.others[i];
-    record.others[i] = {other.object, other.friction, triple(other.normal_W)};
-  }
   record.proxy_mass_kg = step.mass_kg;
   record.proxy_damping_Ns_per_m = step.damping_Ns_per_m;
   record.set(RecordFlag::unresolved, step.unresolved);
   record.contact_count = static_cast<std::uint8_t>(step.contacts);
+  static_assert(std::tuple_size_v<decltype(step.touches)> == most_contacts);
+  for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
+    const models::PoseContact& touch = step.touches[i];
+    record.contacts[i] = {.object = touch.object,
+                          .part = touch.part,
+                          .slips = touch.slips,
+                          .friction = touch.friction,
+                          .gap_m = touch.gap_m,
+                          .point_W_m = triple(touch.point_W),
+                          .normal_W = triple(touch.normal_W),
+                          .force_W_N = triple(touch.force_W)};
+  }
   record.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
 }
 

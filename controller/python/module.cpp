@@ -19,9 +19,11 @@
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/library/session.hpp"
 #include "controller/python/csv_table.hpp"
+#include "controller/signals/contact_columns.hpp"
 #include "controller/signals/derived_signals.hpp"
 #include "controller/signals/signal_columns.hpp"
 #include "models/base/quantity.hpp"
+#include "models/packed/packed.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
 
@@ -257,25 +259,33 @@ class Rows {
   explicit Rows(const Session& session)
       : axes_(axis_names(session)),
         deriver_(session.prepared().cell),
-        text_(controller::signals_header(axes_, true) + "\n") {}
+        text_(controller::signals_header(axes_, true) + "\n"),
+        contacts_(controller::header_of(controller::contact_columns()) + "\n") {}
 
   void add(const CycleRecord& record) {
     controller::append_signals(text_, record, axes_.size(), true, deriver_.derive(record));
     text_ += '\n';
+    for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
+      controller::append_contact(contacts_, record, i);
+      contacts_ += '\n';
+    }
   }
   [[nodiscard]] std::vector<TableColumn> table() const {
     return read_table(text_, {}, text_columns(controller::signal_columns(axes_, true)), "signals");
+  }
+  [[nodiscard]] std::vector<TableColumn> contacts() const {
+    return read_table(contacts_, {}, text_columns(controller::contact_columns()), "contacts");
   }
 
  private:
   std::vector<std::string> axes_;
   controller::SignalDeriver deriver_;
-  std::string text_;
+  std::string text_, contacts_;
 };
 
 constexpr std::uint64_t cycles_between_looks = 256;  // whether somebody has pressed Ctrl-C
 
-// Returns the summary as JSON and the signals.
+// Returns the summary as JSON, the signals and the contacts.
 py::tuple run_session(Session& session, const std::optional<py::function>& world,
                       const std::optional<py::function>& hand) {
   std::optional<PythonWorld> python_world;
@@ -290,7 +300,7 @@ py::tuple run_session(Session& session, const std::optional<py::function>& world
     });
   }
   std::string summary;
-  std::vector<TableColumn> columns;
+  std::vector<TableColumn> columns, contacts;
   {
     const py::gil_scoped_release released;
     Rows rows(session);
@@ -301,9 +311,10 @@ py::tuple run_session(Session& session, const std::optional<py::function>& world
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     }));
     columns = rows.table();
+    contacts = rows.contacts();
   }
   if (python_world && python_world->raised()) std::rethrow_exception(python_world->raised());
-  return py::make_tuple(summary, columns_of(std::move(columns)));
+  return py::make_tuple(summary, columns_of(std::move(columns)), columns_of(std::move(contacts)));
 }
 
 }  // namespace
@@ -332,6 +343,10 @@ PYBIND11_MODULE(_proxarm, module) {
       .def_property_readonly("name", &World::name, "Of the scene.")
       .def_property_readonly("objects", &World::objects, "Their names; contacts have their indices.")
       .def_property_readonly("dimensions", &World::dimensions, "Of the space in which it is touched: 1, 2 or 3.");
+  module.def("_unpacked", [](const py::bytes& frame, std::size_t bytes) -> std::optional<py::bytes> {
+    const auto found = models::unpacked(std::string_view(frame), bytes);
+    return found ? std::optional<py::bytes>(*found) : std::nullopt;
+  });
   module.def(
       "_bare", [](double, py::handle, py::handle) {}, "What a call costs that does nothing.");
 

@@ -2,6 +2,7 @@
 // files and the plot outside of it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -86,14 +87,20 @@ inline models::Vec3 vec3(const Triple& v) noexcept { return {v[0], v[1], v[2]}; 
 
 inline constexpr std::size_t max_axes = 8;
 
-// One that presses beside the first.
-struct OtherContact {
-  std::int32_t object = -1;  // as CycleRecord::contact_object; −1: there is none
-  double friction = 0.0;
-  Triple normal_W{};
+// A place where an object presses on the proxy.
+struct RecordedContact {
+  std::int32_t object = -1;  // by its index in the scene; below 0: no part of it, or there is no contact
+  std::int32_t part = -1;    // of a tool with a shape; −1: a point
+  bool slips = false;
+  double friction = 0.0;  // μ, as it is now
+  double gap_m = 0.0;     // between tool and object there
+  Triple point_W_m{};     // the tool's material point
+  Triple normal_W{};      // unit, out of the object; zero: there is no contact
+  Triple force_W_N{};     // on the tool
 };
-// In free space three normals hold a proxy; what presses beyond that isn't recorded.
-inline constexpr std::size_t other_contacts = 2;
+// So many are recorded: a box has four corners on a table, and eight in a groove. Of a tool the strongest come first;
+// of a point the order is the scene's.
+inline constexpr std::size_t most_contacts = 8;
 
 struct CycleRecord {
   std::uint64_t cycle = 0;     // k
@@ -101,7 +108,7 @@ struct CycleRecord {
   std::int64_t period_ns = 0;  // T, from this cycle to the next one
   Phase phase = Phase::idle;
   ContactPhase contact = ContactPhase::free;
-  std::uint8_t contact_count = 0;  // how many things press at once
+  std::uint8_t contact_count = 0;  // how many things press at once, also beyond most_contacts
   std::uint8_t axes = 0;
   ActiveLimits::Joints limited_joints{};  // held by limits of their own, as bits
   std::uint32_t flags = 0;                // RecordFlag
@@ -118,10 +125,8 @@ struct CycleRecord {
   Triple p_hat_W_m{};                 // (26a)
   Triple proxy_W_m{};                 // q(k)
   Triple contact_force_W_N{};         // f(k), (25a): on the proxy
-  Triple normal_W{};                  // of the first contact; zero when free
-  std::int32_t contact_object = -1;   // of the first contact, by its index in the scene; −1 when free
-  double friction = 0.0;              // its μ, as it is now
-  std::array<OtherContact, other_contacts> others{};
+  // A point's have no place and no force until place_contacts() (signals/point_contacts.hpp).
+  std::array<RecordedContact, most_contacts> contacts{};
   Triple tool_W_m{};               // the rendered point by the encoders, at t_k
   double proxy_clearance_m = 0.0;  // signed distance of the proxy to the nearest surface; below 0: inside
   double tool_clearance_m = 0.0;   // of the tool: by the truth where there is one, else by the encoders
@@ -153,6 +158,9 @@ struct CycleRecord {
 
   std::int64_t compute_ns = 0;  // wall-clock of the whole cycle, waiting apart; goes to timing.json alone
 
+  [[nodiscard]] std::size_t recorded_contacts() const noexcept {
+    return std::min<std::size_t>(contact_count, most_contacts);
+  }
   [[nodiscard]] bool has(RecordFlag flag) const noexcept { return (flags & static_cast<std::uint32_t>(flag)) != 0; }
   void set(RecordFlag flag, bool on = true) noexcept {
     const auto bit = static_cast<std::uint32_t>(flag);

@@ -1,8 +1,11 @@
 #include "controller/record/replay_log.hpp"
 
 #include <algorithm>
+#include <cstring>
+#include <optional>
 
 #include "models/base/setup_error.hpp"
+#include "models/packed/packed.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -13,7 +16,9 @@ using description::SetupError;
 // An upper bound of what a file may claim, far above what a cycle gets: a period of 100 ms on eight buses at 1 Mbit/s.
 constexpr std::uint32_t most_frames_per_cycle = 16384;
 constexpr std::size_t most_entry_bytes = most_frames_per_cycle * 96 + 4096;
-constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', '1', '1'};
+constexpr std::size_t block_bytes = 1 << 18;
+constexpr std::size_t most_block_bytes = block_bytes + most_entry_bytes + sizeof(std::uint32_t);
+constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', '1', '2'};
 
 [[noreturn]] void cannot_write(const fs::path& file, const std::string& found) {
   throw SetupError({.file = file.string(), .found = found, .expected = "a file that can be written"});
@@ -115,21 +120,34 @@ ReplayWriter::ReplayWriter(const fs::path& file, ReplayHead head, std::vector<st
   entry = fieldbus::StateArchive::writer(entry_);
   entry.raw(state);
   put(entry);
+  file_.write(block_.data(), static_cast<std::streamsize>(block_.size()));
+  block_.clear();
 }
 
 void ReplayWriter::put(const fieldbus::StateArchive& entry) {
   const auto bytes = static_cast<std::uint32_t>(entry.bytes());
-  file_.write(reinterpret_cast<const char*>(&bytes), sizeof bytes);
-  file_.write(reinterpret_cast<const char*>(entry_.data()), bytes);
+  block_.append(reinterpret_cast<const char*>(&bytes), sizeof bytes);
+  block_.append(reinterpret_cast<const char*>(entry_.data()), bytes);
+}
+
+void ReplayWriter::end_block() {
+  if (block_.empty()) return;
+  const std::string packed = models::packed(block_);
+  const std::array sizes{static_cast<std::uint32_t>(packed.size()), static_cast<std::uint32_t>(block_.size())};
+  file_.write(reinterpret_cast<const char*>(sizes.data()), sizeof sizes);
+  file_.write(packed.data(), static_cast<std::streamsize>(packed.size()));
+  block_.clear();
 }
 
 void ReplayWriter::add(BoxCycle& cycle, std::vector<BoxFrame>& frames) {
   auto entry = fieldbus::StateArchive::writer(entry_);
   archive(entry, cycle, frames, axes_, buses_);
   put(entry);
+  if (block_.size() >= block_bytes) end_block();
 }
 
 void ReplayWriter::finish() {
+  end_block();
   file_.close();
   if (!file_) cannot_write(name_, "a file that couldn't be written whole");
 }
@@ -209,28 +227,68 @@ ReplayReader::ReplayReader(const fs::path& file) : name_(file) {
   }
   if (!read_entry()) refuse("a file that is too short");
   state_ = entry_;
+  block_begins_ = block_ends_ = file_.tellg();
+}
+
+// False at the end of the file, which is also before a block that isn't whole.
+bool ReplayReader::read_block() {
+  block_begins_ = block_ends_;
+  at_ = 0;
+  block_.clear();
+  file_.clear();
+  file_.seekg(block_begins_);
+  std::array<std::uint32_t, 2> sizes{};
+  file_.read(reinterpret_cast<char*>(sizes.data()), sizeof sizes);
+  if (static_cast<std::size_t>(file_.gcount()) != sizeof sizes) return false;
+  const auto [packed_bytes, bytes] = sizes;
+  if (bytes > most_block_bytes || packed_bytes > most_block_bytes) {
+    refuse("a block of " + std::to_string(std::max(bytes, packed_bytes)) + " bytes");
+  }
+  std::string packed(packed_bytes, '\0');
+  file_.read(packed.data(), packed_bytes);
+  if (static_cast<std::size_t>(file_.gcount()) != packed_bytes) return false;
+  std::optional<std::string> block = models::unpacked(packed, bytes);
+  if (!block || block->empty()) refuse("a block that is damaged");
+  block_ = *std::move(block);
+  block_ends_ = block_begins_ + static_cast<std::int64_t>(sizeof sizes + packed_bytes);
+  return true;
+}
+
+// Of the next cycle; false where there is none.
+bool ReplayReader::read_cycle() {
+  if (at_ == block_.size() && !read_block()) return false;
+  std::uint32_t bytes = 0;
+  const std::size_t left = block_.size() - at_;
+  if (left >= sizeof bytes) std::memcpy(&bytes, block_.data() + at_, sizeof bytes);
+  if (left < sizeof bytes || bytes > left - sizeof bytes) refuse("an entry that is damaged");
+  const auto* const begin = reinterpret_cast<const std::byte*>(block_.data() + at_ + sizeof bytes);
+  entry_.assign(begin, begin + bytes);
+  at_ += sizeof bytes + bytes;
+  return true;
 }
 
 bool ReplayReader::next(BoxCycle& cycle, std::vector<BoxFrame>& frames) {
-  if (!read_entry()) return false;
+  if (!read_cycle()) return false;
   auto entry = fieldbus::StateArchive::reader(entry_);
   const bool sound = archive(entry, cycle, frames, head_.axes, head_.buses);
   if (!sound || !entry.whole() || entry.bytes() != entry_.size()) refuse("an entry that is damaged");
   return true;
 }
 
-void ReplayReader::go_to(std::streamoff position) {
-  file_.clear();
-  file_.seekg(position);
+ReplayPlace ReplayReader::position() const noexcept {
+  if (at_ < block_.size()) return {block_begins_, at_};
+  return {block_ends_, 0};
 }
 
-bool ReplayReader::skip() {
-  std::uint32_t bytes = 0;
-  file_.read(reinterpret_cast<char*>(&bytes), sizeof bytes);
-  if (static_cast<std::size_t>(file_.gcount()) != sizeof bytes || bytes > most_entry_bytes) return false;
-  file_.seekg(bytes, std::ios::cur);
-  return file_.good();
+void ReplayReader::go_to(const ReplayPlace& place) {
+  if (place.block != block_begins_ || block_.empty()) {
+    block_ends_ = place.block;
+    if (!read_block()) return;
+  }
+  at_ = std::min(place.at, block_.size());
 }
+
+bool ReplayReader::skip() { return read_cycle(); }
 
 // ---- the network
 

@@ -2,7 +2,8 @@
 //
 //   cycles.bin   the controller's state at one cycle, and from there on, cycle by cycle, what it was given and the
 //                setpoints that it made of it. Entries, each after its length in bytes (u32): head, state, cycles;
-//                little-endian, without padding. Read by the version of proxarm that wrote it
+//                little-endian, without padding. The cycles' are in blocks, each after its length packed and unpacked
+//                (u32 both). Read by the version of proxarm that wrote it
 //   files/       copies of the cell, scene, arm, sensor, meshes and register maps, at the places that they had beside
 //                each other
 #pragma once
@@ -38,7 +39,14 @@ static_assert(std::is_trivially_copyable_v<ReplayHead>);
 // in common, which is left out there. Throws SetupError.
 std::filesystem::path copy_files(const std::vector<std::filesystem::path>& files, const std::filesystem::path& folder);
 
-// Writes cycles.bin; a failed write is reported by finish().
+// Where an entry of cycles.bin begins: its block in the file, and where in there.
+struct ReplayPlace {
+  std::int64_t block = 0;
+  std::size_t at = 0;
+};
+
+// Writes cycles.bin; a failed write is reported by finish(). A session that dies loses its last block at most, which is
+// a third of a second of the default cell's.
 class ReplayWriter {
  public:
   ReplayWriter(const std::filesystem::path& file, ReplayHead head, std::vector<std::byte> state);
@@ -47,9 +55,11 @@ class ReplayWriter {
 
  private:
   void put(const fieldbus::StateArchive& entry);
+  void end_block();
 
   std::filesystem::path name_;
   std::ofstream file_;
+  std::string block_;  // entries that aren't written yet
   std::uint32_t axes_, buses_;
   std::vector<std::byte> entry_;
 };
@@ -87,17 +97,23 @@ class ReplayReader {
   // the end, since a crash may cut it off.
   bool next(BoxCycle& cycle, std::vector<BoxFrame>& frames);
   // Where the entry begins that next() reads; and to go back there.
-  [[nodiscard]] std::streamoff position() { return file_.tellg(); }
-  void go_to(std::streamoff position);
+  [[nodiscard]] ReplayPlace position() const noexcept;
+  void go_to(const ReplayPlace& place);
   // Passes over an entry. False at the end.
   bool skip();
 
  private:
   [[noreturn]] void refuse(const std::string& found) const;
   bool read_entry();
+  bool read_block();
+  bool read_cycle();
 
   std::filesystem::path name_;
   std::ifstream file_;
+  std::string block_;              // the present one
+  std::int64_t block_begins_ = 0;  // in the file
+  std::int64_t block_ends_ = 0;
+  std::size_t at_ = 0;  // in the block, of the entry that comes next
   ReplayHead head_;
   std::vector<std::byte> state_, entry_;
 };

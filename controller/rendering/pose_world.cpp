@@ -171,25 +171,20 @@ void PoseWorld::report(const ToolPose& p_hat, const ToolPose& limited) noexcept 
   report_contacts();
 }
 
-// The hardest contact first; what touches without a force doesn't count.
+// Keeps the strongest, the strongest first; what touches without a force doesn't count.
 void PoseWorld::report_contacts() noexcept {
-  double hardest_N = 0.0;
+  auto& touches = last_.touches;
+  auto end = touches.begin();
   for (const models::PoseContact& contact : g_->contacts()) {
     const double force_N = contact.force_W.norm();
     if (!(force_N > 0.0)) continue;
-    const int other = last_.contacts++ - 1;
+    ++last_.contacts;
     last_.slips = last_.slips || contact.slips;
-    WorldStep::Contact told{contact.normal_W, contact.object, contact.friction};
-    if (force_N > hardest_N) {
-      hardest_N = force_N;
-      const WorldStep::Contact first{last_.normal_W, last_.object, last_.friction};
-      last_.normal_W = told.normal_W;
-      last_.object = told.object;
-      last_.friction = told.friction;
-      told = first;
-    }
-    if (other >= 0 && other < static_cast<int>(last_.others.size()))
-      last_.others[static_cast<std::size_t>(other)] = told;
+    const auto place = std::find_if(touches.begin(), end, [&](const auto& t) { return t.force_W.norm() < force_N; });
+    if (place == touches.end()) continue;
+    if (end != touches.end()) ++end;
+    std::move_backward(place, end - 1, end);
+    *place = contact;
   }
 }
 

@@ -207,8 +207,7 @@ class WorldOfDimension final : public RenderedWorld {
     last_.mass_kg = proxy_.config().mass_kg;
     last_.damping_Ns_per_m = proxy_.config().damping_Ns_per_m;
     add_contacts<N>(last_, scene_->algorithm<N>().contacts(), space_.basis());
-    last_.friction = changes_.friction(last_.object);
-    for (WorldStep::Contact& other : last_.others) other.friction = changes_.friction(other.object);
+    for (models::PoseContact& touch : recorded_touches(last_)) touch.friction = changes_.friction(touch.object);
   }
 
   void set_spring(double spring_N_per_m) noexcept {

@@ -7,6 +7,7 @@
 //   x = Uᵀ(q_W − o),   h = Uᵀ h_W,   q_W = q_start + U (x − x_start)
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -18,27 +19,20 @@
 #include "controller/rendering/session_settings.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometry.hpp"
+#include "models/geometry/pose_algorithm.hpp"
 #include "scenes/compiler/compile.hpp"
 
 namespace proxarm::controller {
 
 // The result of one step of the proxy; all in W.
 struct WorldStep {
-  struct Contact {
-    models::Vec3 normal_W = models::Vec3::Zero();
-    std::int32_t object = -1;
-    double friction = 0.0;
-  };
   models::Vec3 q_W = models::Vec3::Zero();       // the new proxy
   models::Vec3 p_hat_W = models::Vec3::Zero();   // p̂: the proxy's position without a world
   models::Vec3 f_W = models::Vec3::Zero();       // the world's force on the proxy, (25a)
   models::Vec3 torque_W = models::Vec3::Zero();  // about q; of a rigid tool
   models::Vec3 v_W = models::Vec3::Zero();
-  models::Vec3 normal_W = models::Vec3::Zero();  // of the first contact; zero when free
-  std::int32_t object = -1;                      // of the first contact, by its index in the scene; −1 when free
-  double friction = 0.0;                         // its μ
-  std::array<Contact, 2> others;                 // further contacts that press
-  int contacts = 0;
+  int contacts = 0;                            // how many press
+  std::array<models::PoseContact, 8> touches;  // the first of them; of a point without place and force
   bool slips = false;
   bool unresolved = false;                             // of a rigid tool (pose_algorithm.hpp)
   ActiveLimits limits;                                 // that held the proxy back
@@ -55,15 +49,21 @@ template <int N>
 void add_contacts(WorldStep& step, std::span<const models::Contact<N>> contacts,
                   const Eigen::Matrix<double, 3, N>& basis) noexcept {
   for (const models::Contact<N>& contact : contacts) {
-    const int other = step.contacts++ - 1;
-    if (other < 0) {
-      step.normal_W = basis * contact.normal;
-      step.object = contact.object;
-    } else if (other < static_cast<int>(step.others.size())) {
-      step.others[static_cast<std::size_t>(other)] = {basis * contact.normal, contact.object, 0.0};
+    const auto place = static_cast<std::size_t>(step.contacts++);
+    if (place < step.touches.size()) {
+      models::PoseContact& touch = step.touches[place];
+      touch.object = contact.object;
+      touch.part = -1;
+      touch.slips = contact.slips;
+      touch.normal_W = basis * contact.normal;
     }
     step.slips = step.slips || contact.slips;
   }
+}
+
+// Those of a step that are recorded.
+inline std::span<models::PoseContact> recorded_touches(WorldStep& step) noexcept {
+  return {step.touches.data(), std::min<std::size_t>(static_cast<std::size_t>(step.contacts), step.touches.size())};
 }
 
 class RenderedWorld {

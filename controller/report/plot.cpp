@@ -84,7 +84,7 @@ void PlotBuilder::add(const CycleRecord& record) {
   sample.proxy = record.proxy_W_m;
   sample.hand = record.force_W_N;
   sample.contact_force = record.contact_force_W_N;
-  sample.normal = record.normal_W;
+  sample.normal = record.contacts[0].normal_W;
   sample.proxy_q = record.proxy_q_W;
   sample.tool_q = truth ? record.true_tool_q_W : record.proxy_q_W;
   sample.torque = record.torque_W_Nm;

@@ -10,8 +10,10 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "controller/signals/contact_columns.hpp"
 #include "fieldbus/can/candump_log.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/packed/packed.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -19,11 +21,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t buffer_bytes = 1 << 16;
+constexpr std::size_t packed_at_once = 1 << 18;  // of text: a third of a second of frames, which then take a ninth
 // All files that a session's folder may hold, which a later session replaces.
-constexpr const char* file_names[] = {"signals.csv",    "signals.bin",    "columns.json", "frames.log",  "session.mcap",
-                                      "effective.yaml", "effective.json", "summary.json", "timing.json", "plot.svg",
-                                      "plot.png",       "cell.yaml",      "scene.yaml",   "hand.yaml",   "sensor.yaml",
-                                      "arm.urdf",       "reason.txt"};
+constexpr const char* file_names[] = {"signals.csv",    "signals.bin",    "columns.json",
+                                      "frames.log",     "frames.log.zst", "session.mcap",
+                                      "contacts.csv",   "contacts.bin",   "contact_columns.json",
+                                      "effective.yaml", "effective.json", "summary.json",
+                                      "timing.json",    "plot.svg",       "plot.png",
+                                      "cell.yaml",      "scene.yaml",     "hand.yaml",
+                                      "sensor.yaml",    "arm.urdf",       "reason.txt"};
 
 bool is_ours(std::string_view name) {
   return std::find(std::begin(file_names), std::end(file_names), name) != std::end(file_names);
@@ -69,7 +75,7 @@ SessionWriter::Lock::~Lock() {
 
 SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::string>& axis_names, bool with_truth,
                              SignalsForm form)
-    : folder_(folder), axes_(std::min(axis_names.size(), max_axes)), with_truth_(with_truth) {
+    : folder_(folder), axes_(std::min(axis_names.size(), max_axes)), with_truth_(with_truth), form_(form) {
   std::error_code error;
   if (fs::exists(folder_, error) && !fs::is_directory(folder_, error)) {
     fail("", "a file that is no folder");
@@ -86,16 +92,21 @@ SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::stri
   if (error) fail("", error.message());
   for (const char* name : file_names) fs::remove(folder_ / name, error);
   for (const char* name : {"replay", "black-box", "numpy"}) fs::remove_all(folder_ / name, error);
-  open(frames_, "frames.log");
+  frames_.packed = form == SignalsForm::packed;
+  open(frames_, frames_.packed ? "frames.log.zst" : "frames.log");
   const std::vector<std::string> axes{axis_names.begin(), axis_names.begin() + static_cast<std::ptrdiff_t>(axes_)};
-  if (form == SignalsForm::binary) {
-    table_.emplace(folder_ / "signals.bin", signal_columns(axes, with_truth_));
-    if (table_->error() != 0) fail("signals.bin", std::strerror(table_->error()));
+  const std::vector<SignalColumn> columns = signal_columns(axes, with_truth_);
+  if (form != SignalsForm::csv) {
+    open(table_, "signals.bin", columns);
+    open(contact_table_, "contacts.bin", contact_columns());
   } else {
     open(signals_, "signals.csv");
-    signals_.buffer = signals_header(axes, with_truth_) + "\n";
+    signals_.buffer = header_of(columns) + "\n";
+    open(contacts_, "contacts.csv");
+    contacts_.buffer = header_of(contact_columns()) + "\n";
   }
-  write_file("columns.json", columns_json(axes, with_truth_));
+  write_file("columns.json", json_of(columns));
+  write_file("contact_columns.json", json_of(contact_columns()));
 }
 
 void SessionWriter::fail(const std::string& name, const std::string& found) const {
@@ -114,6 +125,7 @@ void SessionWriter::open(File& file, const char* name) {
 }
 
 void SessionWriter::flush(File& file) {
+  if (file.packed) file.buffer = models::packed(file.buffer);
   file.stream.write(file.buffer.data(), static_cast<std::streamsize>(file.buffer.size()));
   file.buffer.clear();
 }
@@ -126,17 +138,44 @@ void SessionWriter::close(File& file) {
   if (!file.stream) fail(file.name, errno != 0 ? std::strerror(errno) : "a file that couldn't be written whole");
 }
 
+void SessionWriter::open(std::optional<SignalTableWriter>& table, const char* name,
+                         const std::vector<SignalColumn>& columns) {
+  const bool packed = form_ == SignalsForm::packed;
+  table.emplace(folder_ / name, columns, packed ? SignalTableWriter::Blocks::packed : SignalTableWriter::Blocks::plain);
+  if (table->error() != 0) fail(name, std::strerror(table->error()));
+}
+
+void SessionWriter::close(std::optional<SignalTableWriter>& table, const char* name) const {
+  if (!table) return;
+  table->finish();
+  if (table->error() != 0) fail(name, std::strerror(table->error()));
+}
+
 void SessionWriter::add(const CycleRecord& record, const DerivedSignals& derived) {
-  if (table_) return table_->add(record, axes_, with_truth_, derived);
+  for (std::size_t i = 0; i < record.recorded_contacts(); ++i) add_contact(record, i);
+  if (table_) {
+    store_signals(table_->row(), SignalTableWriter::apart, record, axes_, with_truth_, derived);
+    return table_->end_row();
+  }
   append_signals(signals_.buffer, record, axes_, with_truth_, derived);
   signals_.buffer += '\n';
   if (signals_.buffer.size() >= buffer_bytes) flush(signals_);
 }
 
+void SessionWriter::add_contact(const CycleRecord& record, std::size_t index) {
+  if (contact_table_) {
+    store_contact(contact_table_->row(), SignalTableWriter::apart, record, index);
+    return contact_table_->end_row();
+  }
+  append_contact(contacts_.buffer, record, index);
+  contacts_.buffer += '\n';
+  if (contacts_.buffer.size() >= buffer_bytes) flush(contacts_);
+}
+
 void SessionWriter::add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
   fieldbus::CandumpLine line;
   frames_.buffer.append(line.data(), fieldbus::format_candump_line(line, time_ns, bus, frame));
-  if (frames_.buffer.size() >= buffer_bytes) flush(frames_);
+  if (frames_.buffer.size() >= (frames_.packed ? packed_at_once : buffer_bytes)) flush(frames_);
 }
 
 void SessionWriter::write_file(std::string_view name, std::string_view text) {
@@ -148,11 +187,10 @@ void SessionWriter::write_file(std::string_view name, std::string_view text) {
 }
 
 void SessionWriter::finish(const Summary& summary) {
-  if (table_) {
-    table_->finish();
-    if (table_->error() != 0) fail("signals.bin", std::strerror(table_->error()));
-  }
+  close(table_, "signals.bin");
+  close(contact_table_, "contacts.bin");
   close(signals_);
+  close(contacts_);
   close(frames_);
   write_file("summary.json", repeatable_json(summary));
   write_file("timing.json", timing_json(summary));

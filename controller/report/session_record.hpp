@@ -4,10 +4,12 @@
 //                    numbers are the shortest that read back to the same double
 //   signals.bin      the same in its place, where that is wanted (signals/signal_table.hpp)
 //   columns.json     unit, frame and meaning of each of them
+//   contacts.csv     a row for each contact of each cycle (signals/contact_columns.hpp), or contacts.bin in its place;
+//                    contact_columns.json has what they mean
 //   session.mcap     the same session for other tools (messages/mcap_writer.hpp)
-//   frames.log       every frame on every bus, as `candump -L` writes them, so canplayer and log2asc read it
-//   effective.yaml   what the session ran with, every default filled in (and other configuration files by their names)
-//   summary.json     figures that are the same in two runs with the same input (repeatable_json())
+//   frames.log       (packed: frames.log.zst) every frame on every bus, as `candump -L` writes them, so canplayer and
+//   log2asc read it effective.yaml   what the session ran with, every default filled in (and other configuration files
+//   by their names) summary.json     figures that are the same in two runs with the same input (repeatable_json())
 //   replay           what `proxarm replay` needs (replay_log.hpp)
 //   timing.json      those of the wall clock (timing_json()); overruns and compute time stand nowhere else
 //
@@ -27,11 +29,10 @@
 #include "controller/report/summary.hpp"
 #include "controller/signals/signal_columns.hpp"
 #include "controller/signals/signal_table.hpp"
+#include "controller/signals/signals_form.hpp"
 #include "fieldbus/can/can_frame.hpp"
 
 namespace proxarm::controller {
-
-enum class SignalsForm : std::uint8_t { csv, binary };
 
 class SessionWriter {
  public:
@@ -75,18 +76,23 @@ class SessionWriter {
     std::ofstream stream;
     std::string buffer;
     std::string name;
+    bool packed = false;
   };
   void open(File& file, const char* name);
   void flush(File& file);
   void close(File& file);
+  void open(std::optional<SignalTableWriter>& table, const char* name, const std::vector<SignalColumn>& columns);
+  void close(std::optional<SignalTableWriter>& table, const char* name) const;
+  void add_contact(const CycleRecord& record, std::size_t index);
   [[noreturn]] void fail(const std::string& name, const std::string& found) const;
 
   std::filesystem::path folder_;
   Lock lock_;
   std::size_t axes_;
   bool with_truth_;
-  File signals_, frames_;
-  std::optional<SignalTableWriter> table_;  // in the place of signals_
+  SignalsForm form_;
+  File signals_, contacts_, frames_;
+  std::optional<SignalTableWriter> table_, contact_table_;  // in the place of signals_ and contacts_
 };
 
 }  // namespace proxarm::controller

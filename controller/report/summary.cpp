@@ -321,7 +321,7 @@ void SummaryBuilder::State::penetrate(const CycleRecord& record) {
     contact_s += config.period_s;
     touching_ns += period_ns;
     if (record.contact == ContactPhase::slip) slipping_ns += period_ns;
-    const double pull = -vec3(record.normal_W).dot(vec3(record.contact_force_W_N));
+    const double pull = -vec3(record.contacts[0].normal_W).dot(vec3(record.contact_force_W_N));
     // With several contacts only the sum of their forces is known.
     if (record.contact_count <= 1) summary.pulling_force_max_N = std::max(summary.pulling_force_max_N, pull);
   }
@@ -379,7 +379,7 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   const std::size_t i = recent.size() - 2;
   const Vec3 q = vec3(now.proxy_W_m), q1 = vec3(before.proxy_W_m);
   const Vec3 q2 = i >= 2 ? vec3(recent[i - 2].proxy_W_m) : q1;
-  const Vec3 n = vec3(now.normal_W);
+  const Vec3 n = vec3(now.contacts[0].normal_W);
   if (i >= 2) {
     const Vec3 a_q = (q - 2.0 * q1 + q2) / (T * T), v_q = (q - q1) / T;
     const Vec3 pull_back = config.spring_N_per_m * (q - *start);
@@ -399,14 +399,14 @@ void SummaryBuilder::State::turn(const CycleRecord& now) {
 }
 
 void SummaryBuilder::State::slide(const CycleRecord& now, const Vec3& resistance) {
-  if (now.contact != ContactPhase::slip || !(now.friction > 0.0) || now.contact_count > 1) return;
+  if (now.contact != ContactPhase::slip || !(now.contacts[0].friction > 0.0) || now.contact_count > 1) return;
   if (limited(now)) return;  // what a limit takes is no friction
-  const Vec3 n = vec3(now.normal_W);
+  const Vec3 n = vec3(now.contacts[0].normal_W);
   const Vec3 f = vec3(now.contact_force_W_N);
   const Vec3 along = n.dot(f) * n - f;
   if (!(along.norm() > 0.0)) return;
   sliding.tangential += resistance.dot(along.normalized());
-  sliding.limit += -now.friction * n.dot(resistance);
+  sliding.limit += -now.contacts[0].friction * n.dot(resistance);
   sliding.length_s += config.period_s;
 }
 

@@ -10,7 +10,9 @@
 namespace proxarm::controller {
 
 // Sets both clearances of a record, after so much rendering. The tool is where the
-// simulation's truth has it, else where the encoders do.
+// simulation's truth has it, else where the encoders do. A point's contacts get their places, forces (place_contacts())
+// and gaps, in an elastic layer from its surface, so below 0; the gap of an object that is driven stays 0, since the
+// scene's file doesn't say where it is.
 void add_clearances(CycleRecord& record, const scenes::Scene& scene, std::int64_t rendered_ns);
 
 // The same of a rigid tool, by the poses of proxy and tool. Without the simulation's truth the tool is taken to have

@@ -1,122 +1,14 @@
 #include "controller/signals/signal_columns.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 
+#include "controller/signals/written_rows.hpp"
 #include "controller/supervision/fault.hpp"
 #include "models/files/json.hpp"
 
 namespace proxarm::controller {
 namespace {
-
-template <typename Number>
-void append_number(std::string& text, Number value) {
-  std::array<char, 32> digits;
-  const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value);
-  text.append(digits.data(), end);
-}
-
-// Nanoseconds as seconds, digit by digit: 1250000 is 0.00125.
-void append_seconds(std::string& text, std::int64_t ns, std::size_t least_decimals) {
-  if (ns < 0) text += '-';
-  const std::uint64_t size = ns < 0 ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
-  append_number(text, size / 1'000'000'000);
-  std::string decimals = std::to_string(1'000'000'000 + size % 1'000'000'000).substr(1);
-  while (decimals.size() > least_decimals && decimals.back() == '0') decimals.pop_back();
-  if (!decimals.empty()) text += "." + decimals;
-}
-
-// `overrun` is left out because it is of the wall clock, `truth` because the columns say it.
-constexpr std::array written_flags{RecordFlag::sample_held,
-                                   RecordFlag::sample_late,
-                                   RecordFlag::feedback_missing,
-                                   RecordFlag::limit_speed,
-                                   RecordFlag::limit_acceleration,
-                                   RecordFlag::limit_workspace,
-                                   RecordFlag::limit_joint,
-                                   RecordFlag::limit_power,
-                                   RecordFlag::limit_keep_out,
-                                   RecordFlag::limit_joint_speed,
-                                   RecordFlag::limit_joint_acceleration,
-                                   RecordFlag::limit_singularity,
-                                   RecordFlag::limit_following_error,
-                                   RecordFlag::limit_joint_torque,
-                                   RecordFlag::guard_speed,
-                                   RecordFlag::guard_elbow,
-                                   RecordFlag::guard_border,
-                                   RecordFlag::guard_turning,
-                                   RecordFlag::limit_leash,
-                                   RecordFlag::limit_orientation,
-                                   RecordFlag::oscillation,
-                                   RecordFlag::oscillation_lasts,
-                                   RecordFlag::timestep,
-                                   RecordFlag::ramp_in,
-                                   RecordFlag::slowed,
-                                   RecordFlag::power_cut,
-                                   RecordFlag::unresolved,
-                                   RecordFlag::hands_off};
-
-// A row's values, one after the other, as text that ends at commas.
-class TextRow {
- public:
-  explicit TextRow(std::string& text) : text_(text) {}
-
-  void integer(auto value) { append_number(next(), value); }
-  void number(double value) { append_number(next(), value); }
-  void seconds(std::int64_t ns) { append_seconds(next(), ns, 0); }
-  void word(const char* name, int /*number*/) { next() += name; }
-  void empty() { next(); }
-  void flags(const CycleRecord& record) {
-    next();
-    bool first = true;
-    for (const RecordFlag flag : written_flags) {
-      if (!record.has(flag)) continue;
-      if (!first) text_ += '|';
-      text_ += flag_name(flag);
-      first = false;
-    }
-  }
-
- private:
-  std::string& next() {
-    if (!first_) text_ += ',';
-    first_ = false;
-    return text_;
-  }
-
-  std::string& text_;
-  bool first_ = true;
-};
-
-// The same as numbers.
-class NumberRow {
- public:
-  NumberRow(double* first, std::size_t apart) noexcept : at_(first), apart_(apart) {}
-
-  void integer(auto value) noexcept { number(static_cast<double>(value)); }
-  void number(double value) noexcept {
-    *at_ = value;
-    at_ += apart_;
-  }
-  // Both are exact, so the quotient is the double that is nearest to the decimals.
-  void seconds(std::int64_t ns) noexcept { number(static_cast<double>(ns) / 1e9); }
-  void word(const char* /*name*/, int value) noexcept { integer(value); }
-  void empty() noexcept { number(std::bit_cast<double>(empty_bits)); }
-  void flags(const CycleRecord& record) noexcept {
-    std::uint32_t bits = 0;
-    for (std::size_t i = 0; i < written_flags.size(); ++i) bits |= (record.has(written_flags[i]) ? 1U : 0U) << i;
-    integer(bits);
-  }
-
- private:
-  double* at_;
-  std::size_t apart_;
-};
-
-void put_all(auto& row, const auto& values) {
-  for (const double value : values) row.number(value);
-}
 
 void put_first(auto& row, const CycleRecord& r, std::size_t axes, bool with_truth) {
   row.integer(r.cycle);
@@ -125,12 +17,12 @@ void put_first(auto& row, const CycleRecord& r, std::size_t axes, bool with_trut
   row.word(contact_phase_name(r.contact), static_cast<int>(r.contact));
   row.flags(r);
   for (const Triple* values : {&r.force_S_N, &r.torque_S_Nm, &r.force_W_N, &r.torque_W_Nm, &r.p_hat_W_m, &r.proxy_W_m,
-                               &r.contact_force_W_N, &r.normal_W}) {
+                               &r.contact_force_W_N, &r.contacts[0].normal_W}) {
     put_all(row, *values);
   }
   row.integer(static_cast<int>(r.contact_count));
-  row.integer(r.contact_object);
-  row.number(r.friction);
+  row.integer(r.contacts[0].object);
+  row.number(r.contacts[0].friction);
   put_all(row, r.tool_W_m);
   row.number(r.proxy_clearance_m);
   row.number(r.tool_clearance_m);
@@ -160,10 +52,10 @@ void put_more(auto& row, const CycleRecord& r, std::size_t axes, bool with_truth
     derived.torques ? row.number(derived.target_Nm[axis]) : row.empty();
   }
   put_all(row, derived.tool_q_W);
-  for (const OtherContact& other : r.others) {
-    row.integer(other.object);
-    row.number(other.friction);
-    put_all(row, other.normal_W);
+  for (std::size_t i = 1; i < contacts_in_signals; ++i) {
+    row.integer(r.contacts[i].object);
+    row.number(r.contacts[i].friction);
+    put_all(row, r.contacts[i].normal_W);
   }
   if (!with_truth) return;
   if (r.has(RecordFlag::truth)) {
@@ -221,32 +113,6 @@ std::vector<std::string> flag_names() {
 
 using Form = SignalColumn::Form;
 
-// Adds columns one after the other.
-class Columns {
- public:
-  void add(std::string name, std::string unit, std::string frame, std::string meaning, Form form = Form::number) {
-    all.push_back({std::move(name), std::move(unit), std::move(frame), std::move(meaning), form, {}});
-  }
-  void add_words(std::string name, std::string meaning, Form form, std::vector<std::string> words) {
-    add(std::move(name), "", "", std::move(meaning), form);
-    all.back().words = std::move(words);
-  }
-  // "force_W_x_N": a name, an axis, a unit.
-  void add_vector(const std::string& name, const std::string& unit, const std::string& frame,
-                  const std::string& meaning) {
-    const std::string shown = unit == "m/s²" ? "m_per_s2" : unit;
-    for (const char* axis : {"x", "y", "z"}) add(name + "_" + axis + "_" + shown, unit, frame, meaning + ", " + axis);
-  }
-  void add_orientation(const std::string& name, const std::string& meaning) {
-    for (const char* part : {"x", "y", "z", "w"}) add(name + "_q" + part, "1", "W", meaning + ", quaternion " + part);
-  }
-  void add_axes(const std::vector<std::string>& names, const std::string& end, const std::string& unit,
-                const std::string& meaning, Form form = Form::number) {
-    for (const std::string& name : names) add(name + end, unit, "", meaning, form);
-  }
-  std::vector<SignalColumn> all;
-};
-
 void add_first(Columns& columns, const std::vector<std::string>& axis_names, bool with_truth) {
   columns.add("cycle", "1", "", "number of the cycle, k", Form::integer);
   columns.add("time_s", "s", "", "when the cycle was due, after the first one", Form::seconds);
@@ -289,8 +155,8 @@ void add_more(Columns& columns, const std::vector<std::string>& axis_names, bool
   columns.add_axes(axis_names, "_actual_rad", "rad", "measured: the motor's angle at the joint; m of a linear one");
   columns.add_axes(axis_names, "_target_Nm", "Nm", "commanded torque at the joint, where drives take torques");
   columns.add_orientation("tool_W", "orientation of the tool by the encoders");
-  for (std::size_t i = 0; i < other_contacts; ++i) {
-    const std::string number = std::to_string(i + 2);
+  for (std::size_t i = 1; i < contacts_in_signals; ++i) {
+    const std::string number = std::to_string(i + 1);
     columns.add("contact_object_" + number, "1", "", "of another contact: its index in the scene; −1: none",
                 Form::integer);
     columns.add("friction_" + number, "1", "", "its coefficient of friction");
@@ -320,17 +186,19 @@ std::vector<SignalColumn> signal_columns(const std::vector<std::string>& axis_na
   return std::move(columns.all);
 }
 
-std::string signals_header(const std::vector<std::string>& axis_names, bool with_truth) {
+std::string header_of(const std::vector<SignalColumn>& columns) {
   std::string header;
-  for (const SignalColumn& column : signal_columns(axis_names, with_truth)) {
-    header += (header.empty() ? "" : ",") + column.name;
-  }
+  for (const SignalColumn& column : columns) header += (header.empty() ? "" : ",") + column.name;
   return header;
 }
 
-std::string columns_json(const std::vector<std::string>& axis_names, bool with_truth) {
+std::string signals_header(const std::vector<std::string>& axis_names, bool with_truth) {
+  return header_of(signal_columns(axis_names, with_truth));
+}
+
+std::string json_of(const std::vector<SignalColumn>& columns) {
   description::Json all = description::Json::array();
-  for (const SignalColumn& column : signal_columns(axis_names, with_truth)) {
+  for (const SignalColumn& column : columns) {
     description::Json one{{"name", column.name}};
     if (!column.unit.empty()) one["unit"] = column.unit;
     if (!column.frame.empty()) one["frame"] = column.frame;

@@ -35,12 +35,16 @@ struct SignalColumn {
 inline constexpr std::uint64_t empty_bits = 0x7FF8'0045'4D50'5459;
 inline bool is_empty(double value) noexcept { return std::bit_cast<std::uint64_t>(value) == empty_bits; }
 
+// Contacts that have columns here; contact_columns.hpp has all that are recorded, with their places.
+inline constexpr std::size_t contacts_in_signals = 3;
+
 // Of these axes; `with_truth`: with those of the simulation's truth.
 std::vector<SignalColumn> signal_columns(const std::vector<std::string>& axis_names, bool with_truth);
-// The first row, without its end.
+// The first row of a table, without its end.
+std::string header_of(const std::vector<SignalColumn>& columns);
 std::string signals_header(const std::vector<std::string>& axis_names, bool with_truth);
-// The same as JSON: [{"name", "unit", "frame", "meaning"}, …].
-std::string columns_json(const std::vector<std::string>& axis_names, bool with_truth);
+// What they mean, as JSON: [{"name", "unit", "frame", "meaning"}, …].
+std::string json_of(const std::vector<SignalColumn>& columns);
 // A row, without its end.
 void append_signals(std::string& row, const CycleRecord& record, std::size_t axes, bool with_truth,
                     const DerivedSignals& derived = {});

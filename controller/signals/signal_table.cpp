@@ -15,6 +15,7 @@
 
 #include "models/base/setup_error.hpp"
 #include "models/files/json.hpp"
+#include "models/packed/packed.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -26,11 +27,14 @@ using Form = SignalColumn::Form;
 static_assert(std::endian::native == std::endian::little, "signals.bin is written as memory has it");
 
 constexpr std::string_view magic = "PXSIGNAL";
-constexpr std::uint32_t version = 1;
+constexpr std::uint32_t plain_version = 1, packed_version = 2;
 constexpr std::size_t page_bytes = 4096;
-constexpr std::size_t rows_of_block = page_bytes / sizeof(double);
+constexpr std::size_t rows_of_block = SignalTableWriter::apart;
+static_assert(rows_of_block == page_bytes / sizeof(double));
 constexpr std::size_t rows_at_once = 64;  // written; as many as signals.csv's buffer holds
 constexpr std::size_t json_begins_at = 24;
+constexpr std::size_t most_block_rows = 1
+                                        << 16;  // far above what is written: bounds what a damaged head makes of memory
 constexpr std::array<std::pair<Form, const char*>, 5> forms{{{Form::number, "number"},
                                                              {Form::integer, "integer"},
                                                              {Form::seconds, "seconds"},
@@ -55,7 +59,7 @@ std::vector<std::string> parted(std::string_view text) {
 }
 
 // All that comes before the first block.
-std::string table_head(const std::vector<SignalColumn>& columns) {
+std::string table_head(const std::vector<SignalColumn>& columns, std::uint32_t version) {
   Json list = Json::array();
   for (const SignalColumn& column : columns) {
     Json one{{"name", column.name}};
@@ -80,12 +84,14 @@ std::string table_head(const std::vector<SignalColumn>& columns) {
 
 }  // namespace
 
-SignalTableWriter::SignalTableWriter(const std::filesystem::path& file, const std::vector<SignalColumn>& columns)
-    : descriptor_(open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666)),
+SignalTableWriter::SignalTableWriter(const std::filesystem::path& file, const std::vector<SignalColumn>& columns,
+                                     Blocks blocks)
+    : blocks_(blocks),
+      descriptor_(open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666)),
       error_(descriptor_ < 0 ? errno : 0),
       columns_(columns.size()),
       block_(columns_ * rows_of_block) {
-  const std::string head = table_head(columns);
+  const std::string head = table_head(columns, blocks == Blocks::packed ? packed_version : plain_version);
   write(head.data(), head.size(), 0);
   begins_at_ = head.size();
   begin_block();
@@ -124,24 +130,35 @@ void SignalTableWriter::write_block() {
   write(block_.data(), column_bytes, begins_at_);
 }
 
-void SignalTableWriter::add(const CycleRecord& record, std::size_t axes, bool with_truth,
-                            const DerivedSignals& derived) {
-  store_signals(block_.data() + rows_, rows_of_block, record, axes, with_truth, derived);
+void SignalTableWriter::write_packed() {
+  const std::string frame =
+      models::packed({reinterpret_cast<const char*>(block_.data()), block_.size() * sizeof(double)});
+  const auto bytes = static_cast<std::uint32_t>(frame.size());
+  write(&bytes, sizeof bytes, begins_at_);
+  write(frame.data(), frame.size(), begins_at_ + sizeof bytes);
+  begins_at_ += sizeof bytes + frame.size();
+}
+
+void SignalTableWriter::end_row() {
   ++rows_;
-  if (rows_ % rows_at_once == 0) write_block();
-  if (rows_ < rows_of_block) return;
-  begins_at_ += block_.size() * sizeof(double);
-  begin_block();
+  const bool full = rows_ == rows_of_block;
+  if (blocks_ == Blocks::packed) {
+    if (full) write_packed();
+  } else {
+    if (rows_ % rows_at_once == 0) write_block();
+    if (full) begins_at_ += block_.size() * sizeof(double);
+  }
+  if (full) begin_block();
 }
 
 void SignalTableWriter::finish() {
   if (descriptor_ < 0) return;
-  if (rows_ > 0) write_block();
+  if (rows_ > 0) blocks_ == Blocks::packed ? write_packed() : write_block();
   if (close(descriptor_) != 0 && error_ == 0) error_ = errno;
   descriptor_ = -1;
 }
 
-SignalTable::SignalTable(const std::filesystem::path& file) {
+SignalTable::SignalTable(const std::filesystem::path& file) : file_(file) {
   const auto refuse = [&](const std::string& found, const char* expected) {
     throw SetupError({.file = file.string(), .found = found, .expected = expected});
   };
@@ -158,32 +175,35 @@ SignalTable::SignalTable(const std::filesystem::path& file) {
   memory_ = static_cast<const char*>(memory);
   bytes_ = bytes;
   try {
-    read_columns(file.string());
+    read_columns();
+    find_blocks();
+    count_rows();
   } catch (...) {
     munmap(memory, bytes);
     throw;
   }
-  count_rows();
 }
 
 SignalTable::~SignalTable() { munmap(const_cast<char*>(memory_), bytes_); }
 
-void SignalTable::read_columns(const std::string& file) {
+void SignalTable::read_columns() {
   const auto refuse = [&](const std::string& found, const std::string& expected) {
-    throw SetupError({.file = file, .found = found, .expected = expected});
+    throw SetupError({.file = file_.string(), .found = found, .expected = expected});
   };
   if (std::string_view(memory_, magic.size()) != magic) {
     refuse("another kind of file", "signals.bin of a session that was recorded");
   }
   std::array<std::uint32_t, 4> numbers{};
   std::memcpy(numbers.data(), memory_ + magic.size(), sizeof numbers);
-  if (numbers[0] != version) {
-    refuse("version " + std::to_string(numbers[0]), "version " + std::to_string(version) + ", as this proxarm writes");
+  packed_ = numbers[0] == packed_version;
+  if (!packed_ && numbers[0] != plain_version) {
+    refuse("version " + std::to_string(numbers[0]), "version " + std::to_string(plain_version) + " or " +
+                                                        std::to_string(packed_version) + ", as this proxarm writes");
   }
   first_block_ = numbers[1];
   block_rows_ = numbers[2];
   const bool fits = first_block_ > json_begins_at && first_block_ % page_bytes == 0 && first_block_ <= bytes_ &&
-                    block_rows_ > 0 && numbers[3] > 0 && numbers[3] <= first_block_;
+                    block_rows_ > 0 && block_rows_ <= most_block_rows && numbers[3] > 0 && numbers[3] <= first_block_;
   if (!fits) refuse("a head that is cut off or damaged", "signals.bin of a session that was recorded");
   const std::optional<Json> json =
       Json::parse(std::string_view(memory_ + json_begins_at, first_block_ - json_begins_at));
@@ -202,17 +222,48 @@ void SignalTable::read_columns(const std::string& file) {
   }
 }
 
-// Of the last block that is whole, rows are there up to the first one without a cycle's number.
-void SignalTable::count_rows() noexcept {
-  const std::size_t blocks = (bytes_ - first_block_) / (columns_.size() * block_rows_ * sizeof(double));
-  rows_ = blocks * block_rows_;
-  while (rows_ > 0 && rows_ + block_rows_ > blocks * block_rows_ && is_empty(value(rows_ - 1, 0))) --rows_;
+// Those that are whole.
+void SignalTable::find_blocks() {
+  const std::size_t plain_bytes = columns_.size() * block_rows_ * sizeof(double);
+  for (std::size_t at = first_block_; at < bytes_;) {
+    std::size_t bytes = plain_bytes;
+    if (packed_) {
+      std::uint32_t length = 0;
+      if (bytes_ - at < sizeof length) return;
+      std::memcpy(&length, memory_ + at, sizeof length);
+      bytes = sizeof length + length;
+    }
+    if (bytes > bytes_ - at) return;
+    blocks_.push_back(at);
+    at += bytes;
+  }
 }
 
-double SignalTable::value(std::size_t row, std::size_t column) const noexcept {
-  const std::size_t block = row / block_rows_, at = row % block_rows_;
+// Of the last block, rows are there up to the first one without a cycle's number.
+void SignalTable::count_rows() {
+  rows_ = blocks_.size() * block_rows_;
+  while (rows_ > 0 && rows_ + block_rows_ > blocks_.size() * block_rows_ && is_empty(value(rows_ - 1, 0))) --rows_;
+}
+
+const char* SignalTable::block(std::size_t index) const {
+  const char* const begin = memory_ + blocks_[index];
+  if (!packed_) return begin;
+  if (!unpacked_.empty() && unpacked_index_ == index) return unpacked_.data();
+  std::uint32_t length = 0;
+  std::memcpy(&length, begin, sizeof length);
+  auto unpacked = models::unpacked({begin + sizeof length, length}, columns_.size() * block_rows_ * sizeof(double));
+  if (!unpacked) {
+    throw SetupError(
+        {.file = file_.string(), .found = "a block that is damaged", .expected = "what a session has written"});
+  }
+  unpacked_ = *std::move(unpacked);
+  unpacked_index_ = index;
+  return unpacked_.data();
+}
+
+double SignalTable::value(std::size_t row, std::size_t column) const {
   double value = 0.0;
-  std::memcpy(&value, memory_ + first_block_ + ((block * columns_.size() + column) * block_rows_ + at) * sizeof(double),
+  std::memcpy(&value, block(row / block_rows_) + (column * block_rows_ + row % block_rows_) * sizeof(double),
               sizeof value);
   return value;
 }

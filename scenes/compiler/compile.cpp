@@ -375,13 +375,18 @@ double clearance_m(const Scene& scene, const Vec3& x_W) {
 
 namespace {
 
+// The inverse of an object's motion since it was described.
+models::Pose back_to_description(const Object& object, double time_s) {
+  const bool moves = object.motion && !object.motion->driven;
+  return moves ? script_of(*object.motion).at(time_s).inverse(Eigen::Isometry) : models::Pose::Identity();
+}
+
 // Calls visit(object, X⁻¹) for each object whose place is known, with the inverse of its motion since it was described.
 template <typename Visit>
 void visit_objects(const Scene& scene, double time_s, Driven driven, Visit visit) {
   for (const Object& object : scene.objects) {
     if (object.motion && object.motion->driven && driven == Driven::left_out) continue;
-    const bool moves = object.motion && !object.motion->driven;
-    visit(object, moves ? script_of(*object.motion).at(time_s).inverse(Eigen::Isometry) : models::Pose::Identity());
+    visit(object, back_to_description(object, time_s));
   }
 }
 
@@ -399,6 +404,12 @@ double clearance_m(const Scene& scene, const Vec3& x_W, double time_s, Driven dr
     least = std::min(least, distance_to(object, X * x_W));
   });
   return least;
+}
+
+std::optional<double> clearance_m(const Scene& scene, std::size_t object, const Vec3& x_W, double time_s) {
+  const Object& one = scene.objects[object];
+  if (one.motion && one.motion->driven) return std::nullopt;
+  return distance_to(one, back_to_description(one, time_s) * x_W);
 }
 
 double tool_clearance_m(const Scene& scene, const Vec3& tool_W, const Vec3& proxy_W, double time_s, Driven driven) {

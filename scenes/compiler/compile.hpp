@@ -8,6 +8,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -75,6 +76,8 @@ double clearance_m(const Scene& scene, const models::Vec3& x_W);
 // objects count where they are described, or, if their places aren't known, not at all.
 enum class Driven { as_described, left_out };
 double clearance_m(const Scene& scene, const models::Vec3& x_W, double time_s, Driven driven = Driven::as_described);
+// The same of one object; none where it is driven, since its place isn't known. Precondition: object < objects.size().
+std::optional<double> clearance_m(const Scene& scene, std::size_t object, const models::Vec3& x_W, double time_s);
 // The same for a tool whose proxy is at proxy_W. An open mesh has no inside; a tool that it separates from its proxy is
 // behind it, and its distance counts as negative.
 double tool_clearance_m(const Scene& scene, const models::Vec3& tool_W, const models::Vec3& proxy_W, double time_s,

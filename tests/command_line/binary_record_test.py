@@ -1,6 +1,7 @@
 """Records with signals.bin: read here from the layout that docs/files.md promises, and held against signals.csv."""
 import array
 import csv
+import itertools
 import json
 import math
 import os
@@ -10,20 +11,29 @@ import subprocess
 import time
 import unittest
 
+import mcap_reader
 from harness import SOURCE, ProgramTest, program
 from view_client import Session
 
 ROWS = 512  # of a block
+FORMS = {"csv": {"signals.csv", "contacts.csv", "frames.log"}, "binary": {"signals.bin", "contacts.bin", "frames.log"},
+         "packed": {"signals.bin", "contacts.bin", "frames.log.zst"}}
 
 
 def read_table(data):
     """Columns by name, as text, from docs/files.md alone."""
     assert data[:8] == b"PXSIGNAL"
     version, begin, rows, count = struct.unpack("<4I", data[8:24])
-    assert (version, begin % 4096, rows) == (1, 0, ROWS)
+    assert version in (1, 2) and (begin % 4096, rows) == (0, ROWS)
     columns = json.loads(data[24:begin])["columns"]
     assert len(columns) == count
     numbers = [array.array("d") for _ in columns]
+    if version == 2:
+        data, packed = data[:begin], data[begin:]
+        while packed:
+            size, = struct.unpack_from("<I", packed)
+            data += mcap_reader.unpacked("zstd", packed[4:4 + size], 8 * rows * count)
+            packed = packed[4 + size:]
     for block in range((len(data) - begin) // (8 * rows * count)):
         for i, column in enumerate(numbers):
             at = begin + 8 * rows * (block * count + i)
@@ -48,21 +58,22 @@ def read_table(data):
 
 
 class BinaryRecords(ProgramTest):
-    def both(self, *arguments):
+    def both(self, *arguments, form="binary"):
         """The same session twice, as text and as numbers."""
-        for name, form in (("text", "csv"), ("numbers", "binary")):
+        for name, form in (("text", "csv"), ("numbers", form)):
             outcome = self.call("run", "--no-plot", "--json", "--record", name, "--signals", form, *arguments)
             self.assertIn(outcome.status, (0, 1), outcome.err)
         self.assertFalse((self.folder / "numbers/signals.csv").exists())
         return self.folder / "text", self.folder / "numbers"
 
     def test_has_what_the_text_has_to_the_bit(self):
-        for words in (("--duration", "2s"), ("--duration", "5s", "--fault", "axis_3:silent@4s"),
-                      (SOURCE / "models/cells/light.yaml", "--duration", "2s"),
-                      ("--scene", SOURCE / "scenes/soft_corner.yaml", "--hand", SOURCE / "sim/hands/explore.yaml",
-                       "--duration", "4s")):
-            with self.subTest(words):
-                text, numbers = self.both(*words)
+        sessions = (("--duration", "2s"), ("--duration", "5s", "--fault", "axis_3:silent@4s"),
+                    (SOURCE / "models/cells/light.yaml", "--duration", "2s"),
+                    ("--scene", SOURCE / "scenes/soft_corner.yaml", "--hand", SOURCE / "sim/hands/explore.yaml",
+                     "--duration", "4s"))
+        for words, form in itertools.product(sessions, ("binary", "packed")):
+            with self.subTest(words=words, form=form):
+                text, numbers = self.both(*words, form=form)
                 with open(text / "signals.csv", newline="") as file:
                     rows = list(csv.DictReader(file))
                 table = read_table((numbers / "signals.bin").read_bytes())
@@ -74,6 +85,14 @@ class BinaryRecords(ProgramTest):
                                          (row[name] if float(row[name]) == value else value), name)
                 self.assertEqual(self.call("signals", numbers).out, (text / "signals.csv").read_text())
                 self.assertEqual(self.call("signals", text).out, (text / "signals.csv").read_text())
+                contacts = (text / "contacts.csv").read_text()
+                for folder in (text, numbers):
+                    self.assertEqual(self.call("signals", folder, "--contacts").out, contacts)
+                    self.assertEqual((folder / "contact_columns.json").read_text(), (text / "contact_columns.json").read_text())
+                self.assertEqual([column["name"] for column in json.loads((text / "contact_columns.json").read_text())],
+                                 contacts.split("\n")[0].split(","))
+                self.assertEqual(self.call("signals", numbers, "--frames").out, (text / "frames.log").read_text())
+                self.assertEqual(set(os.listdir(numbers)) - set(os.listdir(text)), FORMS[form] - {"frames.log"})
                 self.assertEqual(self.call("replay", numbers).status, 0)
 
     def test_a_cut_file_has_the_rows_of_its_whole_blocks(self):
@@ -88,7 +107,7 @@ class BinaryRecords(ProgramTest):
             self.assertEqual(self.call("signals", numbers).out, "".join(lines[:1 + blocks * ROWS]))
         for data, *found in ((whole[:begin - 1], "a head that is cut off"), (whole[:20], "a file of 20 bytes"), (b"", "a file of 0"),
                              (b"time,x\n" * 10, "another kind of file"),
-                             (whole[:8] + struct.pack("<I", 2) + whole[12:], "version 2", "version 1"),
+                             (whole[:8] + struct.pack("<I", 3) + whole[12:], "version 3", "version 1 or 2"),
                              (whole[:16] + struct.pack("<I", 0) + whole[20:], "cut off or damaged"),
                              (whole[:20] + struct.pack("<I", 7) + whole[24:], "names %d columns" % columns)):
             file.write_bytes(data)
@@ -96,7 +115,41 @@ class BinaryRecords(ProgramTest):
             self.assert_refused(self.call("view", numbers), "signals.bin", *found)
         self.assert_refused(self.call("signals", "."), "neither signals.bin nor signals.csv")
         self.assert_refused(self.call("run", "--signals", "binary"), "--signals", "--record")
-        self.assert_refused(self.call("run", "--record", "a", "--signals", "npy"), "--signals", '"npy"', "binary or csv")
+        self.assert_refused(self.call("run", "--record", "a", "--signals", "npy"), "--signals", '"npy"', "binary, csv or packed")
+
+    def test_without_a_word_it_is_packed_and_a_quarter_of_the_text(self):
+        subprocess.run([program(), "run", "--no-plot", "--record", "packed"], cwd=self.folder, stdout=subprocess.DEVNULL, check=True)
+        self.call("run", "--no-plot", "--record", "text")
+        self.assertLess(FORMS["packed"], set(os.listdir(self.folder / "packed")))
+        self.assertFalse(FORMS["csv"] & set(os.listdir(self.folder / "packed")))
+        size = {name: sum(file.stat().st_size for file in (self.folder / name).rglob("*") if file.is_file())
+                for name in ("packed", "text")}
+        # Ten minutes of that, which moves and touches all the time, have to stay within 600 MB.
+        self.assertLess(60 * size["packed"], 600e6)
+        # Before session.mcap and the replay were packed the text took 41 MB.
+        self.assertLess(4 * size["packed"], 41e6)
+        self.assertEqual(self.call("replay", "packed").status, 0)
+
+    def test_damage_of_a_packed_table_is_told(self):
+        _, numbers = self.both("--duration", "2s", form="packed")
+        file, frames = numbers / "signals.bin", numbers / "frames.log.zst"
+        whole = file.read_bytes()
+        begin, = struct.unpack_from("<I", whole, 12)
+        size, = struct.unpack_from("<I", whole, begin)
+        lines = self.call("signals", numbers).out.splitlines(keepends=True)
+        for data in (whole[:begin + 4 + 40] + b"damage" + whole[begin + 4 + 46:],):
+            file.write_bytes(data)
+            self.assert_refused(self.call("signals", numbers), "signals.bin", "a block that is damaged")
+            self.assert_refused(self.call("view", numbers), "signals.bin", "a block that is damaged")
+        # Cut off, as by a crash: what is whole counts. And a length that no file has is the end.
+        for data in (whole[:begin + 4 + size + 3], whole[:begin + 4 + size + 100],
+                     whole[:begin + 4 + size] + b"\xff\xff\xff\xff" + whole[begin + 8 + size:]):
+            file.write_bytes(data)
+            self.assertEqual(self.call("signals", numbers).out, "".join(lines[:1 + ROWS]))
+        whole = frames.read_bytes()
+        frames.write_bytes(whole[:40] + b"damage" + whole[46:])
+        self.assert_refused(self.call("signals", numbers, "--frames"), "frames.log.zst", "damaged")
+        self.assert_refused(self.call("signals", numbers, "--frames", "--contacts"), "--contacts excludes --frames")
 
     def test_a_session_that_is_killed_leaves_whole_rows(self):
         record = self.folder / "killed"
@@ -119,7 +172,7 @@ class BinaryRecords(ProgramTest):
 
     def test_the_view_shows_the_same(self):
         shown = []
-        for folder in self.both("--duration", "4s"):
+        for folder in (*self.both("--duration", "4s"), self.both("--duration", "4s", form="packed")[1]):
             session = Session(self.folder, "view", folder)
             self.addCleanup(session.end)
             page = session.open_socket()
@@ -131,13 +184,14 @@ class BinaryRecords(ProgramTest):
                 moments.append(page.receive_moment(stage["fields"]))
             shown.append((stage["record"]["cycles"], stage["record"]["events"], stage["record"]["open_at"],
                           [[None if isinstance(v, float) and math.isnan(v) else v for v in m.values()] for m in moments]))
-        self.assertEqual(*shown)
+        self.assertEqual(shown[0], shown[1])
+        self.assertEqual(shown[0], shown[2])
 
     def test_an_earlier_record_is_replaced(self):
-        for form, other in (("binary", "csv"), ("csv", "bin"), ("binary", "csv")):
+        for form, other in (("binary", "csv"), ("csv", "bin"), ("packed", "csv"), ("binary", "csv")):
             self.summary("--duration", "1s", "--record", "session", "--signals", form)
             names = os.listdir(self.folder / "session")
-            self.assertIn("signals." + {"binary": "bin", "csv": "csv"}[form], names)
+            self.assertIn("signals." + {"binary": "bin", "csv": "csv", "packed": "bin"}[form], names)
             self.assertNotIn("signals." + other, names)
 
 

@@ -439,7 +439,7 @@ class Socket(ProgramTest):
 
     def start(self, *arguments):
         self.run = subprocess.Popen([program(), "run", "--json", "--pace", "realtime", "--duration", "30s", "--record",
-                                     "session", "--control", str(self.path), *map(str, arguments)], cwd=self.folder,
+                                     "session", "--signals", "csv", "--control", str(self.path), *map(str, arguments)], cwd=self.folder,
                                     stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.addCleanup(self.run.kill)
         for _ in range(500):

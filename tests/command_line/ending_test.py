@@ -34,7 +34,7 @@ class Ending(ProgramTest):
         shutil.rmtree(self.folder / "session", ignore_errors=True)  # of the session before
         streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
         run = subprocess.Popen([program(), "run", "--json", "--no-plot", "--duration", "1h", "--record", "session",
-                                *arguments], cwd=self.folder, text=True, preexec_fn=preexec_fn, **streams)
+                                "--signals", "csv", *arguments], cwd=self.folder, text=True, preexec_fn=preexec_fn, **streams)
         self.addCleanup(self.end, run)
         deadline = time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline and run.poll() is None:
@@ -176,7 +176,7 @@ class Ending(ProgramTest):
     def test_a_process_that_was_suspended_finds_the_gap_and_stops(self):
         """SIGSTOP can't be caught. Drives have stopped by themselves in the meantime; what catches up is no order of
         anybody who is there."""
-        summary = self.suspended(0.7, 1, "--duration", "60s", "--record", "session")
+        summary = self.suspended(0.7, 1, "--duration", "60s", "--record", "session", "--signals", "csv")
         self.assertEqual([fault["fault"] for fault in summary["faults"]], ["overrun"])
         self.assertIn("was the process suspended?", summary["faults"][0]["text"])
         self.assertLess(summary["simulated_time_s"], 30.0)

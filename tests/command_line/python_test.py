@@ -114,6 +114,29 @@ class Sessions(ProgramTest):
         for name in signals:
             numpy.testing.assert_array_equal(saved[name], signals[name], name)
 
+    def test_contacts_are_the_records(self):
+        """A row for each contact of each cycle, from either form and from a session in Python."""
+        scene, hand = SOURCE / "scenes/valve_key.yaml", SOURCE / "sim/hands/wrench.yaml"
+        for form in ("csv", "binary"):
+            self.call("run", "--no-plot", "--record", form, "--signals", form, "--duration", "3s", "--scene", scene, "--hand", hand,
+                      "--inertia", "0.05")
+            contacts = proxarm.load(self.folder / form).contacts
+            with open(self.folder / "csv" / "contacts.csv", newline="") as file:
+                rows = list(csv.DictReader(file))
+            self.assertGreater(len(rows), 1000)
+            self.assertEqual(list(contacts), list(rows[0]))
+            self.assertEqual(list(contacts["state"]), [row["state"] for row in rows])
+            for name in set(contacts) - {"state"}:
+                self.assertEqual(list(contacts[name]), [float(row[name]) for row in rows], name)
+            self.assertEqual(contacts.vector("point_W_m").shape, (len(rows), 3))
+        (self.folder / "csv" / "contact_columns.json").unlink()
+        with self.assertRaisesRegex(proxarm.SetupError, "contact_columns.json"):
+            proxarm.load(self.folder / "csv").contacts
+        result = proxarm.Session(scene=SOURCE / "scenes/wall.yaml", duration=5).run()
+        touching = result.signals["contacts"] > 0
+        self.assertEqual(list(result.contacts["cycle"]), list(result.signals["cycle"][touching]))
+        self.assertTrue((result.contacts.vector("force_W_N") == result.signals.vector("contact_force_W_N")[touching]).all())
+
     def test_a_long_records_columns_are_kept_until_it_changes(self):
         record = self.folder / "record"
         words = ("--duration", "1s", "--record", record)
@@ -148,6 +171,30 @@ class Sessions(ProgramTest):
         (record / "numpy").write_text("no folder")
         numpy.testing.assert_array_equal(proxarm.load(record).signals["time_s"], whole["time_s"])
 
+    def test_packed_numbers_are_those_of_the_text(self):
+        for folder, form in (("text", "csv"), ("packed", "packed")):
+            self.call("run", "--no-plot", "--duration", "5s", "--fault", "axis_3:silent@4s", "--record", folder, "--signals", form)
+        text, packed = (proxarm.load(self.folder / folder) for folder in ("text", "packed"))
+        self.assertEqual(list(packed.signals), list(text.signals))
+        for name in text.signals:
+            numpy.testing.assert_array_equal(packed.signals[name], text.signals[name], name)
+        for name in text.contacts:
+            numpy.testing.assert_array_equal(packed.contacts[name], text.contacts[name], name)
+        chosen = proxarm.load(self.folder / "packed", columns=["phase", "tool_W_x_m"]).signals
+        numpy.testing.assert_array_equal(chosen["phase"], text.signals["phase"])
+        with self.assertRaisesRegex(proxarm.SetupError, '"torque"'):
+            proxarm.load(self.folder / "packed", columns=["torque"])
+        file = self.folder / "packed" / "signals.bin"
+        whole = file.read_bytes()
+        begin = int.from_bytes(whole[12:16], "little")
+        first = 4 + int.from_bytes(whole[begin:begin + 4], "little")
+        for end, rows in ((begin, 0), (begin + 3, 0), (begin + first - 1, 0), (begin + first, 512), (begin + first + 9, 512)):
+            file.write_bytes(whole[:end])
+            numpy.testing.assert_array_equal(proxarm.load(self.folder / "packed").signals["time_s"], text.signals["time_s"][:rows])
+        file.write_bytes(whole[:begin + 40] + b"damage" + whole[begin + 46:])
+        with self.assertRaisesRegex(proxarm.SetupError, "a block that is damaged"):
+            proxarm.load(self.folder / "packed")
+
     def test_numbers_in_columns_are_those_of_the_text(self):
         for folder, form in (("text", "csv"), ("numbers", "binary")):
             self.call("run", "--no-plot", "--duration", "5s", "--fault", "axis_3:silent@4s", "--record", folder, "--signals", form)
@@ -171,7 +218,7 @@ class Sessions(ProgramTest):
             file.write_bytes(whole[:begin + blocks * 4096 * columns + 4095])
             numpy.testing.assert_array_equal(proxarm.load(self.folder / "numbers").signals["time_s"],
                                              text.signals["time_s"][:512 * blocks])
-        for data, found in ((whole[:8] + b"\2" + whole[9:], "version 2"), (b"cycle,time_s\n0,0\n" * 9, "another kind"),
+        for data, found in ((whole[:8] + b"\3" + whole[9:], "version 3"), (b"cycle,time_s\n0,0\n" * 9, "another kind"),
                             (whole[:10], "another kind|cut off"), (whole[:4000], "cut off")):
             file.write_bytes(data)
             with self.subTest(found), self.assertRaisesRegex(proxarm.SetupError, found):

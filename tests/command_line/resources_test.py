@@ -33,7 +33,7 @@ class Locks(ProgramTest):
     def test_a_record_belongs_to_one_session(self):
         """Both ended with 0, and the first one's record was gone."""
         first = self.start(*LONG)
-        self.await_path(self.folder / "session" / "signals.csv")
+        self.await_path(self.folder / "session" / "signals.bin")
         self.assert_refused(self.call("run", "--json", "--no-plot", "--duration", "0.1s", "--record", "session"),
                             "another session")
         first.send_signal(signal.SIGTERM)
@@ -44,7 +44,7 @@ class Locks(ProgramTest):
 
     def test_a_session_that_was_killed_locks_nothing(self):
         first = self.start(*LONG)
-        self.await_path(self.folder / "session" / "signals.csv")
+        self.await_path(self.folder / "session" / "signals.bin")
         first.kill()
         first.communicate()
         time.sleep(1.0)  # its black box is in there

@@ -188,7 +188,7 @@ class Signals(ProgramTest):
     def stop_by(self, number):
         record = self.folder / "record"
         process = subprocess.Popen([program(), "run", "--pace", "realtime", "--duration", "20s", "--record", record,
-                                    "--json"], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                                    "--signals", "csv", "--json"], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.addCleanup(process.kill)
         begun = time.monotonic()
         while time.monotonic() < begun + 60 and "rendering" not in self.tail(record / "signals.csv"):

@@ -13,7 +13,7 @@ import struct
 import subprocess
 import time
 
-from harness import program
+from harness import as_text, program
 
 PATIENCE_S = 20 * (5 if os.environ.get("PROXARM_SLOW_BUILD") else 1)
 URL = re.compile(r"(http://127\.0\.0\.1:(\d+)/\?token=([0-9a-f]{64}))")
@@ -24,7 +24,7 @@ class Session:
 
     def __init__(self, folder, *arguments, env=None):
         self.begun = time.monotonic()
-        self.process = subprocess.Popen([program(), *map(str, arguments)], cwd=folder, stdin=subprocess.DEVNULL,
+        self.process = subprocess.Popen([program(), *as_text(arguments)], cwd=folder, stdin=subprocess.DEVNULL,
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env)
         self.said = ""
         while not (found := URL.search(self.said)):
@@ -203,12 +203,18 @@ class WebSocket:
             if isinstance(message, str) and name in (value := json.loads(message)):
                 return value[name]
 
-    def receive_moment(self, fields):
-        """The fields of the next moment, by their names."""
+    def receive_moment(self, fields, contact_fields=None):
+        """The fields of the next moment, by their names; with contact_fields those of its contacts as "touches"."""
         while True:
             message = self.receive()
             if isinstance(message, bytes) and struct.unpack_from("<d", message)[0] == 1.0:
-                return dict(zip(fields, struct.unpack_from(f"<{len(fields)}d", message, 8)))
+                moment = dict(zip(fields, struct.unpack_from(f"<{len(fields)}d", message, 8)))
+                if contact_fields:
+                    at, width = 8 * (1 + len(fields)), len(contact_fields)
+                    count = int(struct.unpack_from("<d", message, at)[0])
+                    numbers = struct.unpack_from(f"<{count * width}d", message, at + 8)
+                    moment["touches"] = [dict(zip(contact_fields, numbers[i:])) for i in range(0, len(numbers), width)]
+                return moment
 
     def is_closed(self, within_s=PATIENCE_S):
         """Whether the other side ends it in this time."""

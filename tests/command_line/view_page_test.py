@@ -1,5 +1,6 @@
 """The page of the view in a real browser: what stands in its scene graph, and what is to be seen in its pixels."""
 import csv
+import math
 import os
 import re
 import time
@@ -197,6 +198,70 @@ class Page(ProgramTest):
                 self.assertIn(words, shown)
             self.assertNotIn("hold: ", shown, "without --view-control")
             self.assertEqual(browser.complaints(), [])
+
+    def drawn_contacts(self, browser):
+        """The cycle that is shown, and of each contact its place in the picture and the direction of its force."""
+        return browser.run("""
+            const { world } = proxarm, box = world.canvas.getBoundingClientRect();
+            const marks = world.contacts.marks.filter(({ stick, slip }) => stick.visible || slip.visible);
+            return [world.moment.cycle, world.moment.proxy_clearance_m, marks.map(({ stick, slip }) => {
+              const arrow = stick.visible ? stick : slip, p = arrow.position.clone().project(world.camera);
+              const along = arrow.position.clone().set(0, 0, 1).applyQuaternion(arrow.quaternion);
+              return [box.left + (0.5 + p.x / 2) * box.width, box.top + (0.5 - p.y / 2) * box.height, ...along.toArray(),
+                      arrow === slip];
+            })];""")
+
+    def assert_drawn_as_recorded(self, browser, drawn, folder):
+        """Contacts within a pixel of where their places are, forces within 1°, the distance within 1 µm."""
+        with open(folder / "signals.csv", newline="") as file:
+            signals = {int(row["cycle"]): row for row in csv.DictReader(file)}
+        contacts = {}
+        with open(folder / "contacts.csv", newline="") as file:
+            for row in csv.DictReader(file):
+                force = [float(row[f"force_W_{axis}_N"]) for axis in "xyz"]
+                if math.hypot(*force) * 0.0075 * 0.35 > 2e-3:  # shorter ones aren't drawn, however near the camera
+                    contacts.setdefault(int(row["cycle"]), []).append((row, force))
+        for cycle, distance, marks in drawn:
+            self.assertAlmostEqual(distance, float(signals[cycle]["proxy_clearance_m"]), delta=1e-6)
+            for row, force in contacts.get(cycle, []):
+                place = self.point_of(browser, *(float(row[f"point_W_{axis}_m"]) for axis in "xyz"))
+                x, y, *along, slips = min(marks, key=lambda mark: math.dist(mark[:2], place) +
+                                          math.dist(mark[2:5], [part / math.hypot(*force) for part in force]))
+                self.assertLess(math.dist((x, y), place), 1.0, f"cycle {cycle}")
+                self.assertLess(math.dist(along, [part / math.hypot(*force) for part in force]), math.radians(1))
+                self.assertEqual(slips, row["state"] == "slip")
+
+    def test_contacts_are_drawn_where_the_tool_touches(self):
+        """They were drawn at the handle: cones of the valve key floated 40 mm above it."""
+        for scene, hand in (("rod_over_edge", "lean"), ("peg_in_hole", "insert"), ("valve_key", "wrench"),
+                            ("box_on_table", "tip"), ("probe_on_molar", "probe")):
+            arguments = ("run", "--no-plot", "--record", scene, "--duration", "6s", "--inertia", "0.05", "--scene",
+                         SOURCE / f"scenes/{scene}.yaml", "--hand", SOURCE / f"sim/hands/{hand}.yaml")
+            with self.subTest(scene), view_browser.Browser() as browser:
+                with Session(self.folder, *arguments, "--view", "--pace", "realtime") as session:
+                    self.opened(browser, session)
+                    browser.until("proxarm.world.contacts.marks.some((m) => m.stick.visible || m.slip.visible)", "a touch")
+                    live = []
+                    for _ in range(20):
+                        live.append(self.drawn_contacts(browser))
+                        time.sleep(0.05)
+                    session.until_said("until Ctrl-C")
+                    self.assert_drawn_as_recorded(browser, live, self.folder / scene)
+                with Session(self.folder, "view", scene) as session:
+                    self.opened(browser, session)
+                    browser.run("proxarm.world.look('tool'); proxarm.world.drawFine()")
+                    with open(self.folder / scene / "contacts.csv", newline="") as file:
+                        cycles = [int(row["cycle"]) for row in csv.DictReader(file)]
+                    most = max(set(cycles), key=cycles.count)
+                    for cycle in sorted({*cycles[:: len(cycles) // 8 + 1], most}):
+                        browser.run(f"proxarm.player.goTo({cycle})")
+                        browser.until(f"proxarm.player.isShown({cycle})", "that cycle")
+                        drawn = self.drawn_contacts(browser)
+                        self.assert_drawn_as_recorded(browser, [drawn], self.folder / scene)
+                        if cycle == most:
+                            browser.until("!proxarm.world.changed", "a fine picture")
+                            browser.picture(f"contacts-{scene}")
+                self.assertEqual(browser.complaints(), [])
 
     def test_a_button_with_the_focus_keeps_its_keys(self):
         """A record's keys took the space and the arrows of whoever walks through the page by Tab."""
@@ -464,7 +529,7 @@ class Page(ProgramTest):
                                          .map((l) => l.textContent).find((text) => text.includes('cut'))""", "its label")
                 self.assertEqual(label, f"{forces[impact]:.2f} N, arrow cut")
                 ends = browser.run("""
-                    const { stick, slip } = proxarm.world.contacts, arrow = stick.visible ? stick : slip;
+                    const { stick, slip } = proxarm.world.contacts.marks[0], arrow = stick.visible ? stick : slip;
                     const end = arrow.head.getWorldPosition(proxarm.world.middle.clone()).project(proxarm.world.camera);
                     const box = [...document.querySelectorAll('#labels span')].find((l) => l.textContent.includes('cut'))
                       .getBoundingClientRect(), picture = proxarm.world.canvas.getBoundingClientRect();

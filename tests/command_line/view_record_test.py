@@ -6,6 +6,7 @@ import re
 import shutil
 import unittest
 
+import mcap_reader
 import view_browser
 from harness import SOURCE, ProgramTest
 from view_client import Session
@@ -70,17 +71,24 @@ class Records(ProgramTest):
             index, row = next((i, row) for i, row in enumerate(csv.DictReader(file)) if row["contacts"] == "2")
         page, stage = self.opened(folder)
         page.send({"at": index})
-        while (moment := page.receive_moment(stage["fields"]))["cycle"] != int(row["cycle"]):
+        while (moment := page.receive_moment(stage["fields"], stage["contact_fields"]))["cycle"] != int(row["cycle"]):
             pass
-        names = [stage["scene"]["objects"][int(moment[object])]["name"] for object in ("object", "object_2")]
+        touches = moment["touches"]
+        names = [stage["scene"]["objects"][int(touch["object"])]["name"] for touch in touches]
         self.assertEqual(names, ["table", "foam"])
-        self.assertEqual((moment["friction"], moment["friction_2"]), (0.3, 0.5))
-        self.assertEqual([moment[f"normal_2_{axis}"] for axis in "xyz"], [-1.0, 0.0, 0.0])
+        self.assertEqual([touch["friction"] for touch in touches], [0.3, 0.5])
+        self.assertEqual([touches[1][f"normal_{axis}"] for axis in "xyz"], [-1.0, 0.0, 0.0])
         self.assertEqual((int(row["contact_object_2"]), float(row["normal_2_W_x_1"])), (0, -1.0))
-        self.assertEqual(moment["object_3"], -1)
-        for_others = (folder / "session.mcap").read_bytes()
-        self.assertRegex(for_others, rb'"object":"table","contacts":2,"friction":0.3,[^[]*'
-                                     rb'"others":\[\{"object":"foam","friction":0.5,"normal":\{"x":-1(\.0)?,')
+        # Both at the proxy. The foam is pressed in, the table isn't; and their forces are the world's.
+        for touch in touches:
+            self.assertEqual([touch[f"point_{axis}"] for axis in "xyz"], [moment[f"proxy_{axis}"] for axis in "xyz"])
+        self.assertAlmostEqual(touches[0]["gap_m"], 0.0, places=12)
+        self.assertLess(touches[1]["gap_m"], -1e-6)
+        for axis in "xyz":
+            self.assertAlmostEqual(sum(touch[f"force_{axis}"] for touch in touches), moment[f"contact_force_{axis}"], places=9)
+        said = dict(mcap_reader.messages(folder / "session.mcap")["/contact"])[round(1e9 * float(row["time_s"]))]
+        self.assertEqual((said["object"], said["contacts"], said["friction"]), ("table", 2, 0.3))
+        self.assertEqual(said["others"], [{"object": "foam", "friction": 0.5, "normal": {"x": -1, "y": 0, "z": 0}}])
 
     def test_the_frames_of_a_cycle_are_decoded(self):
         page, stage = self.opened(self.record())
@@ -117,6 +125,69 @@ class Records(ProgramTest):
         (folder / "signals.csv").write_bytes(b"")
         self.assert_refused(self.call("view", folder), "signals.csv", "empty")
 
+
+
+class Contacts(Records):
+    def test_each_contact_is_where_the_record_has_it(self):
+        """A tool's contacts had no place in any output, and were drawn at its handle."""
+        for form in ("csv", "binary"):
+            for scene, hand in (("valve_key", "wrench"), ("box_on_table", "tip")):
+                with self.subTest(form=form, scene=scene):
+                    folder = self.record("--scene", SOURCE / f"scenes/{scene}.yaml", "--inertia", "0.05", "--signals", form,
+                                         "--hand", SOURCE / f"sim/hands/{hand}.yaml")
+                    cycles = {}
+                    for row in csv.DictReader(self.call("signals", folder, "--contacts").out.splitlines()):
+                        cycles.setdefault(int(row["cycle"]), []).append(row)
+                    self.assertGreater(len(cycles), 500)
+                    self.assertGreater(max(map(len, cycles.values())), 1)
+                    page, stage = self.opened(folder)
+                    page.receive_moment(stage["fields"])
+                    for cycle in [0, *list(cycles)[::300]]:
+                        page.send({"at": cycle})
+                        touches = page.receive_moment(stage["fields"], stage["contact_fields"])["touches"]
+                        rows = cycles.get(cycle, [])
+                        self.assertEqual(len(touches), len(rows))
+                        for touch, row in zip(touches, rows):
+                            said = [touch[name] for name in ("object", "part", "slips", "friction", "gap_m")]
+                            kept = [float(row["object"]), float(row["part"]), row["state"] == "slip",
+                                    float(row["friction_1"]), float(row["gap_m"])]
+                            for name, unit in (("point", "m"), ("normal", "1"), ("force", "N")):
+                                said += [touch[f"{name}_{axis}"] for axis in "xyz"]
+                                kept += [float(row[f"{name}_W_{axis}_{unit}"]) for axis in "xyz"]
+                            self.assertEqual(said, kept)
+                    page.close()
+
+    def test_a_record_without_contacts_shows_them_at_the_handle(self):
+        """One of a version that kept none."""
+        folder = self.record()
+        for name in ("contacts.csv", "contact_columns.json"):
+            (folder / name).unlink()
+        with open(folder / "signals.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        index = next(i for i, row in enumerate(rows) if row["contacts"] == "1")
+        page, stage = self.opened(folder)
+        page.receive_moment(stage["fields"])
+        page.send({"at": index})
+        moment = page.receive_moment(stage["fields"], stage["contact_fields"])
+        touch, = moment["touches"]
+        for axis in "xyz":
+            self.assertEqual(touch[f"point_{axis}"], moment[f"proxy_{axis}"])
+            self.assertEqual(touch[f"force_{axis}"], moment[f"contact_force_{axis}"])
+        self.assert_refused(self.call("signals", folder, "--contacts"), "neither contacts.bin nor contacts.csv")
+
+    def test_damaged_contacts_are_refused_or_end_there(self):
+        folder = self.record()
+        file = folder / "contacts.csv"
+        whole = file.read_bytes()
+        for data in (b"", b"a,b\n1,2\n"):
+            file.write_bytes(data)
+            self.assert_refused(self.call("view", folder), "contacts.csv")
+        for data in (whole[:-30], whole[:whole.index(b"\n") + 1], whole.replace(b"stick", b"\xff,,"), whole.replace(b",0.3,", b",1e999,")):
+            file.write_bytes(data)
+            page, stage = self.opened(folder)
+            page.receive_moment(stage["fields"])
+            page.send({"at": stage["record"]["cycles"] - 1})
+            page.receive_moment(stage["fields"], stage["contact_fields"])
 
 
 class Colours(ProgramTest):

@@ -22,7 +22,8 @@ objects:
 """
 # Of a session: C and C++, MuJoCo and what it stands on, meshes, cells, Modbus, hashes. Nothing of a web server.
 LIBRARIES = {"ld-linux-x", "libc", "libm", "libgcc_s", "libstdc", "libmujoco", "libccd", "libqhull_r", "liblodepng",
-             "libtinyxml", "libassimp", "libdraco", "libminizip", "libz", "libyaml-cpp", "libmodbus", "libcrypto"}
+             "libtinyxml", "libassimp", "libdraco", "libminizip", "libz", "libyaml-cpp", "libmodbus", "libcrypto",
+             "libzstd"}
 
 
 def processes_of(pid):
@@ -121,7 +122,9 @@ class Shown(ProgramTest):
                 if isinstance(message, bytes) and message[:8] == b"\0\0\0\0\0\0\xf0\x3f":
                     fields = memoryview(message)[8:8 + 8 * len(stage["fields"])].cast("d")
                     moment = dict(zip(stage["fields"], fields))
-                    poses = memoryview(message)[8 + 8 * len(stage["fields"]):].cast("f")
+                    contacts_at = 8 + 8 * len(stage["fields"])
+                    contacts = int(memoryview(message)[contacts_at:contacts_at + 8].cast("d")[0])
+                    poses = memoryview(message)[contacts_at + 8 * (1 + contacts * len(stage["contact_fields"])):].cast("f")
             plate = poses[7 * (len(stage["links"]) + 1):]
             self.assertAlmostEqual(plate[1], 0.1, places=5)
 

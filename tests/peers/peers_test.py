@@ -16,7 +16,8 @@ import unittest  # noqa: E402
 from harness import ProgramTest  # noqa: E402
 from view_client import Session  # noqa: E402
 
-TOPICS = {"/tool", "/proxy", "/wrench", "/contact", "/joint_states", "/session", "/tf", "/scene"}
+TOPICS = {"/tool", "/proxy", "/wrench", "/contact", "/joint_states", "/session", "/tf", "/scene", "/contacts",
+          "/contact_arrows"}
 if not shutil.which("node") or not shutil.which("npm"):
     print("no node and npm: peers from npm can't be asked")
     sys.exit(77)
@@ -55,6 +56,10 @@ class Peers(ProgramTest):
         for topic in ("/tool", "/proxy", "/session", "/tf"):
             self.assertEqual(found["indexed"][topic], (cycles + 9) // 10)
         self.assertEqual(found["indexed"]["/scene"], 1)
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            touching = [row["contacts"] != "0" for row in csv.DictReader(file)]
+        ends = sum(before and not now for before, now in zip(touching, touching[1:]))
+        self.assertEqual(found["indexed"]["/contacts"], sum(touching) + ends)
         for name, (encoding, title) in found["schemas"].items():
             self.assertEqual((encoding, title), ("jsonschema", name))
         last = found["samples"]["/session"]

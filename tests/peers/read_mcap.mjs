@@ -1,4 +1,5 @@
 // Reads an MCAP file with @mcap/core, through its index and then from its beginning to its end; prints what it found.
+import { execFileSync } from 'node:child_process';
 import { readFile } from 'node:fs/promises';
 import mcap from '@mcap/core';
 
@@ -10,7 +11,11 @@ const readable = {
   read: async (offset, size) => bytes.subarray(Number(offset), Number(offset + size)),
 };
 
-const reader = await McapIndexedReader.Initialize({ readable });
+// Chunks are compressed; Node.js 20 has no Zstandard, Debian's program has.
+const decompressHandlers = {
+  zstd: (packed) => new Uint8Array(execFileSync('zstd', ['-dc'], { input: packed, maxBuffer: 1 << 26 })),
+};
+const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
 const indexed = {};
 let last = -1n;
 const samples = {};
@@ -22,7 +27,7 @@ for await (const message of reader.readMessages()) {
   samples[channel.topic] = JSON.parse(new TextDecoder().decode(message.data));
 }
 
-const stream = new McapStreamReader();
+const stream = new McapStreamReader({ decompressHandlers });
 stream.append(bytes);
 const streamed = {}, topics = {};
 for (let record = stream.nextRecord(); record; record = stream.nextRecord()) {

@@ -37,7 +37,7 @@ def dot(a, b):
 def run(cell, scene, arguments, record):
     """`proxarm run` with a record and a summary in JSON. Its command is kept beside the record."""
     command = [os.environ["PROXARM_PROGRAM"], "run", str(cell), "--scene", str(scene), *map(str, arguments), "--no-plot",
-               "--json", "--record", str(record)]
+               "--json", "--record", str(record), "--signals", "csv"]
     record.with_name(f"{record.name}.command").write_text(" ".join(command) + "\n")
     return subprocess.run(command, cwd=record.parent, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
 

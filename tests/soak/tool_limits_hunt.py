@@ -189,7 +189,7 @@ def session(seed, folder):
     (folder / "cell.yaml").write_text(made_cell(chance))
     (folder / "hand.yaml").write_text(made_hand(chance))
     command = [harness.program(), "run", str(folder / "cell.yaml"), "--hand", str(folder / "hand.yaml"),
-               *made_arguments(chance), "--record", str(folder / "record")]
+               *made_arguments(chance), "--record", str(folder / "record"), "--signals", "csv"]
     (folder / "command").write_text(" ".join(command) + "\n")
     # The hand is what the mass is judged by, so some of the masses are refused: those sessions are run all the same.
     done, stable = call(command, folder), True

@@ -168,7 +168,7 @@ def simulated_arm(bus, *options):
 
 def controller(bus, duration, record=None, *options):
     return Process(PROGRAM, "run", "--bus", bus, "--duration", duration, "--json", "--no-plot",
-                   *(["--record", record] if record else []), *options)
+                   *(["--record", record, "--signals", "csv"] if record else []), *options)
 
 
 def candump(*interfaces):

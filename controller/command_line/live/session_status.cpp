@@ -47,8 +47,8 @@ std::optional<Status> present(const controller::BoxReader& box, const PreparedSe
     const double way_m = (controller::vec3(record.tool_W_m) - controller::vec3(before->record.tool_W_m)).norm();
     status.tool_speed_m_per_s = elapsed_s > 0.0 ? way_m / elapsed_s : 0.0;
   }
-  const auto object = static_cast<std::size_t>(record.contact_object);
-  if (record.contact_object >= 0 && object < session.scene.objects.size()) {
+  const auto object = static_cast<std::size_t>(record.contacts[0].object);
+  if (record.contacts[0].object >= 0 && object < session.scene.objects.size()) {
     status.touches = session.scene.objects[object].name;
   }
   for (const auto& [flag, limit] : controller::limit_flags) {

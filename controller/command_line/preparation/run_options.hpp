@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "controller/rendering/session_settings.hpp"
+#include "controller/signals/signals_form.hpp"
 #include "sim/devices/device_fault.hpp"
 #include "sim/devices/enabling_switch.hpp"
 
@@ -66,16 +67,16 @@ struct RunOptions {
   std::optional<LookaheadChoice> lookahead;  // unset: off
   controller::SessionSettings settings;      // all that isn't optional above
   BusMapping bus;
-  std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface
-  std::filesystem::path record_dir;     // empty: no record
-  bool binary_signals = false;          // signals.bin in the place of signals.csv
-  std::vector<std::string> changes;     // NAME=VALUE@TIME
-  std::vector<std::string> orders;      // ORDER@TIME
-  bool without_proof = false;           // real drives of a cell that isn't proven
-  std::string hardware;                 // empty: simulations only; ask, checked
-  std::filesystem::path control;        // socket that takes changes; empty: none
-  std::filesystem::path black_box_dir;  // empty: in the record, or proxarm-black-box
-  std::filesystem::path plot_file;      // empty: proxarm-run.svg, none with --json
+  std::optional<Pace> pace;          // unset: virtual in-process, real time on an interface
+  std::filesystem::path record_dir;  // empty: no record
+  controller::SignalsForm signals = controller::SignalsForm::packed;  // of the record
+  std::vector<std::string> changes;                                   // NAME=VALUE@TIME
+  std::vector<std::string> orders;                                    // ORDER@TIME
+  bool without_proof = false;                                         // real drives of a cell that isn't proven
+  std::string hardware;                                               // empty: simulations only; ask, checked
+  std::filesystem::path control;                                      // socket that takes changes; empty: none
+  std::filesystem::path black_box_dir;                                // empty: in the record, or proxarm-black-box
+  std::filesystem::path plot_file;                                    // empty: proxarm-run.svg, none with --json
   bool plot = true;
   bool json = false;
   bool force_unstable = false;

@@ -119,7 +119,10 @@ class Drain {
   }
   void drain() {
     CycleRecord record;
-    while (records_.pop(record)) output_.add(record);
+    while (records_.pop(record)) {
+      const CycleRecord completed = output_.add(record);
+      if (messages_ != nullptr) messages_->add(completed);
+    }
     meter_.drain();
     if (replay_ != nullptr) replay_->drain(keeper_.head());
     if (messages_ != nullptr) messages_->drain(keeper_.box());

@@ -13,6 +13,8 @@ class RecordedMessages {
  public:
   // Throws SetupError.
   RecordedMessages(const std::filesystem::path& folder, const PreparedSession& session);
+  // As SessionOutput::add() returns it.
+  void add(const controller::CycleRecord& completed) { record_.add(completed); }
   void drain(const controller::BoxReader& box) { record_.drain(box); }
   void finish() { record_.finish(); }
 

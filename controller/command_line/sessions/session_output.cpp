@@ -86,9 +86,8 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
   if (options.record_dir.empty()) return;
-  const auto form = options.binary_signals ? controller::SignalsForm::binary : controller::SignalsForm::csv;
   writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, controller::joint_names(session.cell),
-                                                        with_truth, form);
+                                                        with_truth, options.signals);
   writer_->write_file("effective.yaml", effective_config(session));
 }
 
@@ -268,20 +267,22 @@ void SessionOutput::say_poses() {
   }
 }
 
-void SessionOutput::add(const CycleRecord& record) {
+CycleRecord SessionOutput::add(const CycleRecord& record) {
   const auto begun = std::chrono::steady_clock::now();
-  tell(record);
+  CycleRecord completed = record;
+  if (record.phase == controller::Phase::rendering) rendered_ns_ += record.period_ns;
+  controller::complete(completed, session_, rendered_ns_);
+  tell(completed);
   spent_ += std::chrono::steady_clock::now() - begun;
+  return completed;
 }
 
-void SessionOutput::tell(CycleRecord record) {
-  if (record.phase == controller::Phase::rendering) rendered_ns_ += record.period_ns;
+void SessionOutput::tell(const CycleRecord& record) {
   // A hold for a change of the timestep ends by itself; one that doesn't is told of after it.
   if (record.phase != controller::Phase::holding || !record.has(controller::RecordFlag::timestep)) {
     if (record.phase != last_phase_) say_how_to_get_free(record.phase);
     last_phase_ = record.phase;
   }
-  controller::complete(record, session_, rendered_ns_);
   say_timestep(record);
   follow_lateness(record);
   builder_.add(record);

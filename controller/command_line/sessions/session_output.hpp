@@ -32,8 +32,8 @@ class SessionOutput {
 
   // What the user should know before the arm moves. Whoever reads it may want it to end: signals are watched by then.
   void introduce() const;
-  // Adds what only the scene knows (distances, friction), and passes the record on.
-  void add(const controller::CycleRecord& record);
+  // Adds what only the scene knows (distances, friction), and passes the record on. Returns it with what was added.
+  controller::CycleRecord add(const controller::CycleRecord& record);
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
 
   // Of all that was added and what the cycle found; the caller fills in what only it knows before finish(). `cause`: of
@@ -52,7 +52,7 @@ class SessionOutput {
   [[nodiscard]] controller::LoopModel judged_loop() const;
   void say_oscillation();
   void say_belief(const controller::CycleRecord& record);
-  void tell(controller::CycleRecord record);
+  void tell(const controller::CycleRecord& record);
   void judge_pose(const controller::CycleRecord& record);
   void say_poses();
   void say_how_to_get_free(controller::Phase phase) const;

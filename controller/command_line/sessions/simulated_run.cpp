@@ -137,7 +137,8 @@ void SimulatedRun::drain(controller::SpscRing<CycleRecord>& records) {
   CycleRecord record;
   while (records.pop(record)) {
     controller::add_truth(record, truth_);
-    output_.add(record);
+    const CycleRecord completed = output_.add(record);
+    if (messages_) messages_->add(completed);
   }
   if (replay_) replay_->drain(keeper_.head());
   if (messages_) messages_->drain(keeper_.box());

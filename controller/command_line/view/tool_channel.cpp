@@ -29,7 +29,8 @@ std::uint32_t channel_of(Topic topic) { return static_cast<std::uint32_t>(topic)
 
 // What the arm alone has nothing to say of.
 bool is_of_controller(Topic topic) {
-  return topic == Topic::proxy || topic == Topic::contact || topic == Topic::session;
+  return topic == Topic::proxy || topic == Topic::contact || topic == Topic::session || topic == Topic::contacts ||
+         topic == Topic::contact_arrows;
 }
 
 json channels(bool arm_alone) {
@@ -70,6 +71,11 @@ void warn(view::Socket& socket, const std::string& text) {
   socket.say(text_of({{"op", "status"}, {"level", warning}, {"message", text}}), false);
 }
 
+std::int64_t now_ns() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+}
+
 bool same(const std::vector<models::Pose>& a, const std::vector<models::Pose>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [](const auto& x, const auto& y) { return x.matrix() == y.matrix(); });
@@ -78,7 +84,7 @@ bool same(const std::vector<models::Pose>& a, const std::vector<models::Pose>& b
 }  // namespace
 
 ToolChannel::ToolChannel(const view::Stage& stage, const view::PresentSettings& settings, ControlLine& control)
-    : stage_(stage), settings_(settings), control_(control), messages_(stage) {}
+    : stage_(stage), settings_(settings), control_(control), messages_(stage), session_id_(std::to_string(now_ns())) {}
 
 std::string ToolChannel::choose(const std::vector<std::string>& offered) const {
   for (const char* known : protocols) {
@@ -95,7 +101,7 @@ void ToolChannel::opened(const SocketPtr& socket) {
                        {"capabilities", {"parameters", "parametersSubscribe"}},
                        {"supportedEncodings", {"json"}},
                        {"metadata", json::object()},
-                       {"sessionId", std::to_string(clock_ns_)}}),
+                       {"sessionId", session_id_}}),
               false);
   socket->say(text_of({{"op", "advertise"}, {"channels", channels(stage_.options().arm_alone)}}), false);
 }
@@ -218,8 +224,7 @@ void ToolChannel::tell_changes() {
 
 void ToolChannel::show(const view::Moment& given) {
   if (clock_ns_ == 0) {
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
-    clock_ns_ = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count() - given.record.time_ns;
+    clock_ns_ = now_ns() - given.record.time_ns;
   }
   if (clients_.empty()) return;
   tell_changes();

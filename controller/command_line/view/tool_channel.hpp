@@ -55,6 +55,7 @@ class ToolChannel final : public view::Channel {
   const view::PresentSettings& settings_;
   ControlLine& control_;
   view::SessionMessages messages_;
+  std::string session_id_;  // another for each session, by which tools know that one has begun anew
   std::vector<Client> clients_;
   std::array<double, 3> told_{};  // of the parameters, to those who watch them
   std::int64_t clock_ns_ = 0;     // of the machine, at the session's first cycle

@@ -16,7 +16,7 @@ import subprocess
 
 import numpy
 
-from ._proxarm import SetupError, World, _Session, _read_table
+from ._proxarm import SetupError, World, _Session, _read_table, _unpacked
 
 __all__ = ["Live", "Record", "Result", "Session", "SetupError", "Signals", "Study", "World", "load", "run", "study"]
 
@@ -69,18 +69,29 @@ class Signals(collections.abc.Mapping):
 
 
 class Result:
-    """What a simulated session gives: `summary`, a dict as `proxarm run --json` prints it, and its `signals`."""
+    """What a simulated session gives: `summary`, a dict as `proxarm run --json` prints it, its `signals`, a row for each
+    cycle, and its `contacts`, a row for each contact of each cycle (docs/files.md), both as Signals."""
 
-    def __init__(self, summary, signals):
-        self.summary, self.signals = summary, signals
+    def __init__(self, summary, signals, contacts):
+        self.summary, self.signals, self.contacts = summary, signals, contacts
 
 
 class Record(Result):
     """A session that was kept by `proxarm run --record`."""
 
-    def __init__(self, summary, signals, meanings):
-        super().__init__(summary, signals)
+    def __init__(self, folder, summary, signals, meanings):
+        self.folder, self.summary, self.signals = folder, summary, signals
         self.meanings = meanings  # of each column: unit, frame and meaning
+
+    @functools.cached_property
+    def contacts(self):
+        """Read when they are first asked for. SetupError: a record of a version that kept none."""
+        described = _json(self.folder / "contact_columns.json")
+        names = [column["name"] for column in described]
+        if (table := self.folder / "contacts.bin").exists():
+            return _Table(table).signals(names)
+        text = [column["name"] for column in described if "unit" not in column]
+        return Signals(_read_table(str(self.folder / "contacts.csv"), names, text))
 
 
 class Session:
@@ -98,8 +109,8 @@ class Session:
     def run(self, world=None, hand=None):
         """world(kappa, p, q) -> where the proxy goes, in place of the scene; hand(time_s, position, velocity) -> N, in
         place of the hand's motion and grip. All in W, three numbers each. What either raises comes out of here."""
-        summary, columns = _Session(*self._options).run(world, hand)
-        return Result(json.loads(summary), Signals(columns))
+        summary, columns, contacts = _Session(*self._options).run(world, hand)
+        return Result(json.loads(summary), Signals(columns), Signals(contacts))
 
 
 KEEP_FROM_BYTES = 100_000_000  # of a signals.csv that takes about half a second to read
@@ -117,15 +128,16 @@ def load(folder, columns=None, keep=True):
     wanted = list(columns or (column["name"] for column in described))
     text = [column["name"] for column in described if "unit" not in column]
     signals = _load_signals(folder, wanted, text, keep)
-    return Record(summary, signals, {column.pop("name"): column for column in described})
+    return Record(folder, summary, signals, {column.pop("name"): column for column in described})
 
 
 class _Table:
-    """signals.bin (docs/files.md), mapped into memory: a column is read when somebody asks for it."""
+    """signals.bin or contacts.bin (docs/files.md), mapped into memory: a column is read when somebody asks for it. Of a
+    packed one the wanted columns are unpacked at once."""
 
     def __init__(self, file):
         def refuse(found):
-            raise SetupError(f"{file}: found {found}, expected signals.bin of a record, version 1")
+            raise SetupError(f"{file}: found {found}, expected a table of a record, version 1 or 2")
 
         with open(file, "rb") as start:
             head = start.read(24)
@@ -134,15 +146,19 @@ class _Table:
             if len(head) < 24:
                 refuse("a head that is cut off")
             version, begin, block_rows, columns = map(int, numpy.frombuffer(head[8:], "<u4"))
-            if version != 1:
+            if version not in (1, 2):
                 refuse(f"version {version}")
+            self._packed = version == 2
             try:
                 self.columns = json.loads(start.read(begin - 24))["columns"]
             except ValueError:
                 refuse("a head that is cut off")
+        self._file, self._begin = file, begin
+        if self._packed:
+            self._block = columns, block_rows
+            return
         shape = ((file.stat().st_size - begin) // (8 * block_rows * columns), columns, block_rows)
         self._blocks = numpy.memmap(file, "<f8", "r", begin, shape) if shape[0] else numpy.empty(shape)
-        self._file, self._begin = file, begin
         # Rows of the last block that have no cycle number are none.
         self._rows = self._blocks[:, 0].size - (int(numpy.isnan(self._blocks[-1, 0]).sum()) if shape[0] else 0)
 
@@ -151,8 +167,24 @@ class _Table:
         for name in wanted:
             if name not in numbers:
                 raise SetupError(f'columns: found "{name}", expected the name of a column')
+        if self._packed:
+            values = self._unpack([0, *(numbers[name] for name in wanted)])
+            return Signals((name, *self._with_words(numbers[name], column)) for name, column in zip(wanted, values))
         self._fetch({numbers[name] for name in wanted})
         return Signals((name, functools.partial(self._read, numbers[name])) for name in wanted)
+
+    def _unpack(self, wanted):
+        """The columns of these numbers, the first of which is that of the cycles: without it, but as long as it says."""
+        data, at, blocks = self._file.read_bytes(), self._begin, []
+        while at + 4 <= len(data) and at + 4 + (size := int.from_bytes(data[at:at + 4], "little")) <= len(data):
+            block = _unpacked(data[at + 4:at + 4 + size], 8 * self._block[0] * self._block[1])
+            if block is None:
+                raise SetupError(f"{self._file}: found a block that is damaged, expected what a session has written")
+            blocks.append(numpy.frombuffer(block, "<f8").reshape(self._block)[wanted])
+            at += 4 + size
+        columns = numpy.concatenate(blocks, axis=1) if blocks else numpy.empty((len(wanted), 0))
+        rows = columns.shape[1] - (int(numpy.isnan(blocks[-1][0]).sum()) if blocks else 0)
+        return [column[:rows] for column in columns[1:]]
 
     def _fetch(self, wanted):
         """Has the pages of some columns brought from the disk, all at once. Its reading ahead would bring all of them."""
@@ -169,7 +201,9 @@ class _Table:
                     os.posix_fadvise(file.fileno(), at, 8 * rows * (end - begin), os.POSIX_FADV_WILLNEED)
 
     def _read(self, number):
-        values = self._blocks[:, number].reshape(-1)[: self._rows]
+        return self._with_words(number, self._blocks[:, number].reshape(-1)[: self._rows])
+
+    def _with_words(self, number, values):
         form, words = self.columns[number]["form"], self.columns[number].get("words", "").split("|")
         if form == "word":
             return values.astype(numpy.int32), words

@@ -25,33 +25,43 @@ McapRecord::McapRecord(const std::filesystem::path& file, Stage& stage)
   }
 }
 
-void McapRecord::add(Topic topic, const Moment& moment) {
+void McapRecord::write(Topic topic, const Moment& moment) {
   writer_.add(channels_[static_cast<std::size_t>(topic)], moment.record.time_ns,
               messages_.message(topic, moment, links_, objects_));
 }
 
+// Nothing where there are none, but once where there have been some.
+void McapRecord::write_contacts(Topic topic, const Moment& moment, bool& told) {
+  const bool some = moment.record.recorded_contacts() > 0;
+  if (some || told) write(topic, moment);
+  told = some;
+}
+
 void McapRecord::drain(const controller::BoxReader& box) {
-  next_ = std::max(next_, box.oldest_cycle());
-  for (const std::uint64_t end = box.cycles(); next_ < end; ++next_) {
-    if (box.read(next_, cycle_)) add(cycle_);
+  for (const std::uint64_t end = box.cycles(); !waiting_.empty() && waiting_.front().cycle < end;
+       waiting_.pop_front()) {
+    if (!box.read(waiting_.front().cycle, cycle_)) continue;
+    cycle_.record = waiting_.front();
+    write(cycle_);
   }
 }
 
-void McapRecord::add(const controller::BoxCycle& cycle) {
+void McapRecord::write(const controller::BoxCycle& cycle) {
   const double rendered_s = 1e-9 * static_cast<double>(cycle.rendered_ns);
   stage_.follow(cycle.change, cycle.record.phase == controller::Phase::rendering,
                 1e-9 * static_cast<double>(cycle.record.period_ns));
   builder_.add(cycle.record, rendered_s);
-  Moment moment = builder_.take();
-  stage_.complete(moment.record, rendered_s);
-  for (const Topic topic : {Topic::wrench, Topic::contact, Topic::joint_states}) add(topic, moment);
+  const Moment moment = builder_.take();
+  for (const Topic topic : {Topic::wrench, Topic::contact, Topic::joint_states}) write(topic, moment);
+  write_contacts(Topic::contacts, moment, told_contacts_);
   if (cycles_++ % cycles_per_pose != 0) return;
+  write_contacts(Topic::contact_arrows, moment, told_arrows_);
   stage_.place(moment.record, rendered_s, links_, objects_);
   if (cycles_ == 1 || !same(objects_, drawn_)) {
     drawn_ = objects_;
-    add(Topic::scene, moment);
+    write(Topic::scene, moment);
   }
-  for (const Topic topic : {Topic::tool, Topic::proxy, Topic::session, Topic::transforms}) add(topic, moment);
+  for (const Topic topic : {Topic::tool, Topic::proxy, Topic::session, Topic::transforms}) write(topic, moment);
 }
 
 void McapRecord::finish() { writer_.finish(); }

@@ -1,8 +1,10 @@
-// Writes session.mcap of a record: forces, contacts and joints of every cycle, poses and transforms of every tenth, and
-// the scene when something in it moves. It is taken from the black box while the session runs, outside of the cycle.
+// Writes session.mcap of a record: forces and joints of every cycle, contacts where there are some, poses and
+// transforms of every tenth, and the scene when something in it moves. It is written while the session runs, outside of
+// the cycle.
 #pragma once
 
 #include <array>
+#include <deque>
 #include <filesystem>
 #include <vector>
 
@@ -16,13 +18,17 @@ class McapRecord {
   // Precondition: `stage` outlives this object. Throws SetupError.
   McapRecord(const std::filesystem::path& file, Stage& stage);
 
-  // Writes the cycles that have been added since the last call.
+  // A cycle as the record's signals have it: with its distances, and in simulation with the truth.
+  void add(const controller::CycleRecord& completed) { waiting_.push_back(completed); }
+  // Writes the cycles that have been added since the last call, with the changes that the box has of them. Cycles that
+  // the box has lost are left out.
   void drain(const controller::BoxReader& box);
   void finish();  // throws SetupError
 
  private:
-  void add(const controller::BoxCycle& cycle);
-  void add(Topic topic, const Moment& moment);
+  void write(const controller::BoxCycle& cycle);
+  void write(Topic topic, const Moment& moment);
+  void write_contacts(Topic topic, const Moment& moment, bool& told);
 
   Stage& stage_;
   SessionMessages messages_;
@@ -30,7 +36,9 @@ class McapRecord {
   std::array<std::uint16_t, topic_count> channels_{};
   MomentBuilder builder_;
   std::vector<models::Pose> links_, objects_, drawn_;
-  std::uint64_t next_ = 0, cycles_ = 0;
+  std::deque<controller::CycleRecord> waiting_;  // for the box to have the whole cycle
+  std::uint64_t cycles_ = 0;
+  bool told_contacts_ = false, told_arrows_ = false;  // a message that names some is the last one
   controller::BoxCycle cycle_;
 };
 

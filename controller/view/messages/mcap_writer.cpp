@@ -5,11 +5,13 @@
 #include <cstring>
 
 #include "models/base/setup_error.hpp"
+#include "models/packed/packed.hpp"
 
 namespace proxarm::view {
 namespace {
 
 constexpr std::string_view magic("\x89MCAP0\r\n", 8);
+constexpr std::string_view compression = "zstd";
 constexpr std::size_t chunk_bytes = 1 << 20;
 
 enum class Op : std::uint8_t {
@@ -123,15 +125,17 @@ void McapWriter::add(std::uint16_t channel, std::int64_t time_ns, std::string_vi
 void McapWriter::end_chunk() {
   if (content_.empty()) return;
   chunk_.begins = at_;
+  const std::string packed = models::packed(content_);
   chunk_.content_bytes = content_.size();
+  chunk_.packed_bytes = packed.size();
   write(record(Op::chunk, Content()
                               .number(chunk_.first_ns)
                               .number(chunk_.last_ns)
                               .number(static_cast<std::uint64_t>(content_.size()))
                               .number(crc_of(content_))
-                              .text("")
-                              .number(static_cast<std::uint64_t>(content_.size()))
-                              .raw(content_)));
+                              .text(compression)
+                              .number(chunk_.packed_bytes)
+                              .raw(packed)));
   chunk_.bytes = at_ - chunk_.begins;
   const std::uint64_t indices = at_;
   for (const auto& [channel, places] : places_) {
@@ -154,8 +158,8 @@ void McapWriter::write_chunk_index(const Chunk& chunk) {
                                     .number(chunk.bytes)
                                     .numbers(chunk.index_of_channel)
                                     .number(chunk.index_bytes)
-                                    .text("")
-                                    .number(chunk.content_bytes)
+                                    .text(compression)
+                                    .number(chunk.packed_bytes)
                                     .number(chunk.content_bytes)));
 }
 

@@ -3,8 +3,8 @@
 // A file is magic, records, magic. A record is an opcode (u8), its length (u64) and its content. Numbers are
 // little-endian; strings and maps are preceded by their length in bytes (u32). Messages are in chunks of about a
 // megabyte, each followed by an index of its messages. At the end, schemas and channels are repeated, with the chunks'
-// index and the counts, so that a reader finds any time without reading all. Chunks aren't compressed, and only they
-// have checksums.
+// index and the counts, so that a reader finds any time without reading all. Chunks are compressed by Zstandard, and
+// only they have checksums.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ class McapWriter {
  private:
   struct Chunk {
     std::int64_t first_ns = 0, last_ns = 0;
-    std::uint64_t begins = 0, bytes = 0, index_bytes = 0, content_bytes = 0;
+    std::uint64_t begins = 0, bytes = 0, index_bytes = 0, content_bytes = 0, packed_bytes = 0;
     std::map<std::uint16_t, std::uint64_t> index_of_channel;
   };
   void write(std::string_view bytes);

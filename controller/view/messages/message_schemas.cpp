@@ -61,7 +61,18 @@ constexpr std::string_view scene_schema = R"({
         "lifetime": @time,
         "frame_locked": @flag,
         "metadata": @anything,
-        "arrows": @anything,
+        "arrows": {"type": "array", "items": {
+          "title": "foxglove.ArrowPrimitive",
+          "type": "object",
+          "properties": {
+            "pose": @pose,
+            "shaft_length": @number,
+            "shaft_diameter": @number,
+            "head_length": @number,
+            "head_diameter": @number,
+            "color": @colour
+          }
+        }},
         "cubes": {"type": "array", "items": {
           "title": "foxglove.CubePrimitive",
           "type": "object",
@@ -129,6 +140,29 @@ constexpr std::string_view contact_schema = R"({
   }
 })";
 
+constexpr std::string_view contacts_schema = R"({
+  "title": "proxarm.Contacts",
+  "type": "object",
+  "properties": {
+    "timestamp": @time,
+    "frame_id": @text,
+    "contacts": {"type": "array", "items": {
+      "type": "object",
+      "properties": {
+        "object": @text,
+        "part": {"type": "integer"},
+        "state": @text,
+        "friction": @number,
+        "gap_m": @number,
+        "point": @vector,
+        "normal": @vector,
+        "force": @vector,
+        "torque": @vector
+      }
+    }}
+  }
+})";
+
 constexpr std::string_view joints_schema = R"({
   "title": "proxarm.JointStates",
   "type": "object",
@@ -179,6 +213,8 @@ const TopicDescription& describe(Topic topic) {
       {"/session", "proxarm.Session", whole(session_schema)},
       {"/tf", "foxglove.FrameTransforms", whole(transforms_schema)},
       {"/scene", "foxglove.SceneUpdate", whole(scene_schema)},
+      {"/contacts", "proxarm.Contacts", whole(contacts_schema)},
+      {"/contact_arrows", "foxglove.SceneUpdate", whole(scene_schema)},
   }};
   return all[static_cast<std::size_t>(topic)];
 }

@@ -1,5 +1,8 @@
 #include "controller/view/messages/session_messages.hpp"
 
+#include <algorithm>
+
+#include "controller/signals/contact_columns.hpp"
 #include "controller/supervision/fault.hpp"
 #include "controller/view/stage/json_text.hpp"
 #include "controller/view/stage/words.hpp"
@@ -70,10 +73,17 @@ constexpr std::size_t most_triangles = 20'000;
 class Entity {
  public:
   explicit Entity(const Colour& colour) : colour_(colour) {
-    for (JsonText* list : {&cubes_, &spheres_, &cylinders_, &triangles_}) list->begin_list();
+    for (JsonText* list : {&arrows_, &cubes_, &spheres_, &cylinders_, &triangles_}) list->begin_list();
   }
   void set_colour(const Colour& colour) { colour_ = colour; }
 
+  // Points along x of its pose.
+  void add_arrow(const Pose& X, double length_m, double thickness_m) {
+    const double head_m = std::min(3.0 * thickness_m, length_m);
+    begin_shape(arrows_, X);
+    arrows_.add("shaft_length", length_m - head_m).add("shaft_diameter", thickness_m);
+    arrows_.add("head_length", head_m).add("head_diameter", 2.0 * thickness_m).end();
+  }
   void add_cube(const Pose& X, const Vec3& size_m) {
     begin_shape(cubes_, X);
     put(cubes_.name("size"), size_m);
@@ -107,7 +117,8 @@ class Entity {
     json.add("frame_id", frame).add("id", id);
     put_time(json.name("lifetime"), 0);
     json.add("frame_locked", true);
-    for (const char* none : {"metadata", "arrows", "lines", "texts", "models"}) json.name(none).begin_list().end();
+    for (const char* none : {"metadata", "lines", "texts", "models"}) json.name(none).begin_list().end();
+    json.name("arrows").splice(arrows_.end());
     json.name("cubes").splice(cubes_.end()).name("spheres").splice(spheres_.end());
     json.name("cylinders").splice(cylinders_.end()).name("triangles").splice(triangles_.end()).end();
   }
@@ -118,7 +129,7 @@ class Entity {
     put(list.name("color"), colour_);
   }
   Colour colour_;
-  JsonText cubes_, spheres_, cylinders_, triangles_;
+  JsonText arrows_, cubes_, spheres_, cylinders_, triangles_;
 };
 
 void add_shape(Entity& entity, const models::LinkShape& shape) {
@@ -202,12 +213,13 @@ std::string object_name(const Stage& stage, std::int32_t object) {
 std::string contact_message(const Stage& stage, const controller::CycleRecord& record) {
   JsonText json = begin_message(record.time_ns);
   json.add("frame_id", "W").add("state", controller::contact_phase_name(record.contact));
-  json.add("object", object_name(stage, record.contact_object));
-  json.add("contacts", record.contact_count).add("friction", record.friction);
+  json.add("object", object_name(stage, record.contacts[0].object));
+  json.add("contacts", record.contact_count).add("friction", record.contacts[0].friction);
   put(json.name("force"), controller::vec3(record.contact_force_W_N));
-  put(json.name("normal"), controller::vec3(record.normal_W));
+  put(json.name("normal"), controller::vec3(record.contacts[0].normal_W));
   json.name("others").begin_list();
-  for (const controller::OtherContact& other : record.others) {
+  for (std::size_t i = 1; i < std::min(controller::contacts_in_signals, record.recorded_contacts()); ++i) {
+    const controller::RecordedContact& other = record.contacts[i];
     if (other.object < 0) continue;
     json.begin_object().add("object", object_name(stage, other.object)).add("friction", other.friction);
     put(json.name("normal"), controller::vec3(other.normal_W));
@@ -216,6 +228,41 @@ std::string contact_message(const Stage& stage, const controller::CycleRecord& r
   json.end();
   json.add("proxy_clearance_m", record.proxy_clearance_m).add("tool_clearance_m", record.tool_clearance_m);
   return json.end().take();
+}
+
+std::string contacts_message(const Stage& stage, const controller::CycleRecord& record) {
+  JsonText json = begin_message(record.time_ns);
+  json.add("frame_id", "W").name("contacts").begin_list();
+  for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
+    const controller::RecordedContact& contact = record.contacts[i];
+    json.begin_object().add("object", object_name(stage, contact.object)).add("part", contact.part);
+    json.add("state", contact.slips ? "slip" : "stick").add("friction", contact.friction).add("gap_m", contact.gap_m);
+    put(json.name("point"), controller::vec3(contact.point_W_m));
+    put(json.name("normal"), controller::vec3(contact.normal_W));
+    put(json.name("force"), controller::vec3(contact.force_W_N));
+    put(json.name("torque"), controller::vec3(controller::contact_torque_W_Nm(record, contact)));
+    json.end();
+  }
+  return json.end().end().take();
+}
+
+std::string contact_arrows_message(const controller::CycleRecord& record) {
+  constexpr double metres_per_N = 0.005, thickness_m = 0.004;
+  constexpr Colour sticks{0.0, 0.447, 0.698, 1.0}, slips{0.835, 0.369, 0.0, 1.0};
+  Entity entity(sticks);
+  for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
+    const controller::RecordedContact& contact = record.contacts[i];
+    const Vec3 force = controller::vec3(contact.force_W_N);
+    if (!(force.norm() > 0.0)) continue;
+    Pose X = at(controller::vec3(contact.point_W_m));
+    X.linear() = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitX(), force).toRotationMatrix();
+    entity.set_colour(contact.slips ? slips : sticks);
+    entity.add_arrow(X, metres_per_N * force.norm(), thickness_m);
+  }
+  JsonText json;
+  json.begin_object().name("deletions").begin_list().end().name("entities").begin_list();
+  entity.put_into(json, "contacts", "W", record.time_ns);
+  return json.end().end().take();
 }
 
 std::string joints_message(const Stage& stage, const controller::CycleRecord& record) {
@@ -247,6 +294,13 @@ std::string session_message(const Moment& moment) {
   return json.end().take();
 }
 
+Pose proxy_pose(const controller::CycleRecord& record) {
+  const auto& [x, y, z, w] = record.proxy_q_W;
+  Pose X = at(controller::vec3(record.proxy_W_m));
+  X.linear() = Eigen::Quaterniond(w, x, y, z).toRotationMatrix();
+  return X;
+}
+
 std::string pose_message(std::int64_t time_ns, const Pose& X) {
   JsonText json = begin_message(time_ns);
   put(json.add("frame_id", "W").name("pose"), X);
@@ -266,7 +320,7 @@ std::string SessionMessages::message(Topic topic, const Moment& moment, std::spa
       return pose_message(record.time_ns, X);
     }
     case Topic::proxy:
-      return pose_message(record.time_ns, at(controller::vec3(record.proxy_W_m)));
+      return pose_message(record.time_ns, proxy_pose(record));
     case Topic::wrench:
       return wrench_message(record);
     case Topic::contact:
@@ -277,6 +331,10 @@ std::string SessionMessages::message(Topic topic, const Moment& moment, std::spa
       return session_message(moment);
     case Topic::transforms:
       return transforms_message(stage_, record.time_ns, links);
+    case Topic::contacts:
+      return contacts_message(stage_, record);
+    case Topic::contact_arrows:
+      return contact_arrows_message(record);
     case Topic::scene:
       return scene_message(stage_, record.time_ns, objects);
   }

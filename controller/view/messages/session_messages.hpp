@@ -4,10 +4,11 @@
 //   /tool, /proxy      foxglove.PoseInFrame       where they are, in W
 //   /wrench            proxarm.Wrench             the hand's, in W
 //   /contact           proxarm.Contact            the world's force on the proxy, normal, friction, distances
-//   /joint_states      proxarm.JointStates        commanded and measured
-//   /session           proxarm.Session            phase, limits, fault, mass
-//   /tf                foxglove.FrameTransforms   the arm's links in W
-//   /scene             foxglove.SceneUpdate       arm and scene; once, and when objects move
+//   /contacts          proxarm.Contacts           each that is recorded: place, normal, force, torque, object, part,
+//   gap /contact_arrows    foxglove.SceneUpdate       their forces, at their places /joint_states proxarm.JointStates
+//   commanded and measured /session           proxarm.Session            phase, limits, fault, mass /tf
+//   foxglove.FrameTransforms   the arm's links in W /scene             foxglove.SceneUpdate       arm and scene; once,
+//   and when objects move
 #pragma once
 
 #include <cstdint>
@@ -19,8 +20,19 @@
 
 namespace proxarm::view {
 
-enum class Topic : std::uint8_t { tool, proxy, wrench, contact, joint_states, session, transforms, scene };
-inline constexpr std::size_t topic_count = static_cast<std::size_t>(Topic::scene) + 1;
+enum class Topic : std::uint8_t {
+  tool,
+  proxy,
+  wrench,
+  contact,
+  joint_states,
+  session,
+  transforms,
+  scene,
+  contacts,
+  contact_arrows
+};
+inline constexpr std::size_t topic_count = static_cast<std::size_t>(Topic::contact_arrows) + 1;
 
 struct TopicDescription {
   const char* topic;

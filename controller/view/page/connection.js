@@ -13,6 +13,7 @@ export class Connection {
   constructor(handlers) {
     this.handlers = handlers;
     this.fields = [];
+    this.contactFields = [];
     this.questions = new Map();
     this.lastId = 0;
     this.open();
@@ -55,6 +56,7 @@ export class Connection {
     }
     if (name === 'stage') {
       this.fields = value.fields;
+      this.contactFields = value.contact_fields;
       this.links = value.links.length;
       this.objects = value.scene.objects.length;
     }
@@ -65,9 +67,11 @@ export class Connection {
     const head = new Float64Array(buffer, 0, 2);
     const width = this.fields.length;
     if (head[0] === KIND_MOMENT) {
-      const posesAt = 8 * (1 + width);
+      const contactsAt = 8 * (1 + width), count = new Float64Array(buffer, contactsAt, 1)[0];
+      const posesAt = contactsAt + 8 * (1 + count * this.contactFields.length);
       this.handlers.moment({
         ...this.named(new Float64Array(buffer, 8, width), 0),
+        touches: this.touches(new Float64Array(buffer, contactsAt + 8, count * this.contactFields.length), count),
         links: new Float32Array(buffer, posesAt, POSE_FLOATS * this.links),
         objects: new Float32Array(buffer, posesAt + 4 * POSE_FLOATS * this.links, POSE_FLOATS * this.objects),
       });
@@ -77,10 +81,16 @@ export class Connection {
     }
   }
 
-  named(numbers, from) {
+  named(numbers, from, fields = this.fields) {
     const moment = {};
-    for (let i = 0; i < this.fields.length; ++i) moment[this.fields[i]] = numbers[from + i];
+    for (let i = 0; i < fields.length; ++i) moment[fields[i]] = numbers[from + i];
     return moment;
+  }
+
+  // The places where something presses, those that are recorded.
+  touches(numbers, count) {
+    const fields = this.contactFields;
+    return Array.from({ length: count }, (_, i) => this.named(numbers, i * fields.length, fields));
   }
 }
 

@@ -1,4 +1,5 @@
-// Proxy and tool as two things, what they have behind them, and the forces on them: arrows, cone, normal.
+// Proxy and tool as two things, what they have behind them, and the forces on them: the hand's at the handle, the
+// world's at each place where something presses, with its normal and friction cone.
 import * as THREE from './three/build/three.module.js';
 import { UP, Arrow } from './shapes.js';
 import { colour, onTheme } from './theme.js';
@@ -11,9 +12,11 @@ const METRES_PER_NEWTON = 0.0075;
 const MOST_N = 40;
 const CONE_HEIGHT = 0.1;
 const TRAIL_POINTS = 360;
-const FREE = 0, STICK = 1, SLIP = 2;
+const LEAST_N = 0.005;  // what two decimals say of a force
+const FREE = 0;
 
 const at = (moment, name) => new THREE.Vector3(...vector(moment, name));
+const newtonsOf = (touch) => Math.hypot(...vector(touch, 'force'));
 
 // Where the proxy has been in the last seconds: plain in free motion, in colour along what it touched.
 class Trail extends THREE.Line {
@@ -69,13 +72,9 @@ export class ContactView extends THREE.Group {
     this.leash.frustumCulled = false;
     this.hand = new Arrow(this.materials.hand, { radius: 0.0036 });
     this.hand.name = 'hand force';
-    this.stick = new Arrow(this.materials.stick, { radius: 0.0045 });
-    this.stick.name = 'stick force';
-    this.slip = new Arrow(this.materials.slip, { radius: 0.0045, pieces: 5 });
-    this.slip.name = 'slip force';
-    this.cones = ['', '_2', '_3'].map((end) => this.makeCone(end));
+    this.marks = [];
     this.trail = new Trail();
-    this.add(this.trail, this.leash, ...this.cones.flatMap((c) => [c.cone, c.normal]), this.hand, this.stick, this.slip, this.tool, this.proxy);
+    this.add(this.trail, this.leash, this.hand, this.tool, this.proxy);
   }
 
   makeMaterials() {
@@ -105,12 +104,25 @@ export class ContactView extends THREE.Group {
     });
   }
 
-  // Of a contact whose fields have this end: of height 1 and radius 1 about z, its tip at the contact; scaled by the
-  // coefficient of friction.
-  makeCone(end) {
-    const cone = new THREE.Group(), normal = new Arrow(this.materials.normal, { radius: 0.0014 });
-    cone.name = `friction cone${end}`;
-    normal.name = `normal${end}`;
+  // What is drawn at the place of a contact; `end` tells those of several apart by their names.
+  makeMark(end) {
+    const mark = {
+      normal: new Arrow(this.materials.normal, { radius: 0.0014 }),
+      stick: new Arrow(this.materials.stick, { radius: 0.0045 }),
+      slip: new Arrow(this.materials.slip, { radius: 0.0045, pieces: 5 }),
+      cone: this.makeCone(),
+    };
+    for (const [kind, words] of [['normal', 'normal'], ['stick', 'stick force'], ['slip', 'slip force'], ['cone', 'friction cone']]) {
+      mark[kind].name = words + end;
+      this.add(mark[kind]);
+    }
+    for (const kind of ['normal', 'stick', 'slip']) mark[kind].setThickness(this.size);
+    return mark;
+  }
+
+  // Of height 1 and radius 1 about z, its tip at the contact; scaled by the coefficient of friction.
+  makeCone() {
+    const cone = new THREE.Group();
     const sides = 36;
     const geometry = new THREE.ConeBufferGeometry(1, 1, sides, 1, true).rotateX(-Math.PI / 2).translate(0, 0, 0.5);
     const rim = [];
@@ -124,18 +136,32 @@ export class ContactView extends THREE.Group {
       new THREE.Line(new THREE.BufferGeometry().setFromPoints(rim), this.materials.coneEdge),
       new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(ribs), this.materials.coneEdge));
     cone.visible = false;
-    return { cone, normal, fields: `normal${end}`, friction: `friction${end}` };
+    return cone;
   }
 
-  showCone({ cone, normal, fields, friction }, moment, proxy) {
-    const direction = at(moment, fields), touches = moment.contact !== FREE && direction.lengthSq() > 0.5;
-    const height = CONE_HEIGHT * this.size;
-    normal.setTo(proxy, touches ? direction.clone().multiplyScalar(1.25 * height) : new THREE.Vector3());
-    cone.visible = touches && moment[friction] > 1e-6;
+  // One mark for each contact; those that aren't wanted now are hidden.
+  showMarks(touches) {
+    while (this.marks.length < touches.length) {
+      this.marks.push(this.makeMark(this.marks.length ? `_${this.marks.length + 1}` : ''));
+    }
+    this.marks.forEach((mark, i) => {
+      if (i < touches.length) return this.showMark(mark, touches[i]);
+      for (const part of Object.values(mark)) part.visible = false;
+    });
+  }
+
+  showMark({ normal, stick, slip, cone }, touch) {
+    const point = at(touch, 'point'), direction = at(touch, 'normal'), height = CONE_HEIGHT * this.size;
+    const none = new THREE.Vector3(), force = this.arrowOf(touch, 'force'), cut = newtonsOf(touch) > MOST_N;
+    stick.setTo(point, touch.slips ? none : force, cut);
+    slip.setTo(point, touch.slips ? force : none, cut);
+    const known = direction.lengthSq() > 0.5;
+    normal.setTo(point, known ? direction.clone().multiplyScalar(1.25 * height) : none);
+    cone.visible = known && touch.friction > 1e-6;
     if (!cone.visible) return;
-    cone.position.copy(proxy);
+    cone.position.copy(point);
     cone.quaternion.setFromUnitVectors(UP, direction);
-    const radius = Math.min(2.5 * height, moment[friction] * height);
+    const radius = Math.min(2.5 * height, touch.friction * height);
     cone.scale.set(radius, radius, height);
   }
 
@@ -160,13 +186,10 @@ export class ContactView extends THREE.Group {
       this.trail.push(proxy, moment.contact);
     }
 
-    const force = this.arrowOf(moment, 'contact_force'), hand = this.arrowOf(moment, 'force');
-    // The hand's arrow ends where it pushes, the world's begins there.
+    const hand = this.arrowOf(moment, 'force');
+    // The hand's arrow ends where it pushes, the world's begin where it presses.
     this.hand.setTo(proxy.clone().sub(hand), hand, moment.hand_N > MOST_N);
-    const none = new THREE.Vector3(), cut = moment.contact_N > MOST_N;
-    this.stick.setTo(proxy, moment.contact === STICK ? force : none, cut);
-    this.slip.setTo(proxy, moment.contact === SLIP ? force : none, cut);
-    for (const one of this.cones) this.showCone(one, moment, proxy);
+    this.showMarks(moment.contact === FREE ? [] : moment.touches);
   }
 
   // By the camera's distance from the tool. True: it has changed enough to be drawn anew.
@@ -175,7 +198,7 @@ export class ContactView extends THREE.Group {
     if (Math.abs(size / this.size - 1) < 0.02) return false;
     this.size = size;
     for (const thing of [this.proxy, this.tool]) thing.scale.setScalar(size);
-    for (const arrow of [this.hand, this.stick, this.slip, ...this.cones.map((c) => c.normal)]) arrow.setThickness(size);
+    for (const arrow of [this.hand, ...this.marks.flatMap((m) => [m.stick, m.slip, m.normal])]) arrow.setThickness(size);
     return true;
   }
 
@@ -184,18 +207,22 @@ export class ContactView extends THREE.Group {
     return at(moment, name).clampLength(0, MOST_N).multiplyScalar(METRES_PER_NEWTON * this.size);
   }
 
-  // What is written beside the arrows. `told`: the moment that the numbers are of.
+  // What is written beside the arrows. `told`: the moment that the numbers are of. Labels that yield come last: they are
+  // left out where they would lie over others.
   labels(moment, told) {
     const proxy = this.proxyOf(moment), out = [];
     const text = (force_N) => newtons(force_N) + (force_N > MOST_N ? ', arrow cut' : '');
-    if (told.contact !== FREE) {
-      out.push({ name: 'contact', at: proxy.clone().add(this.arrowOf(moment, 'contact_force')), text: text(told.contact_N),
-                 colour: told.contact === SLIP ? '--slip' : '--stick', beside: [-78, -40] });
-    }
+    // Of a contact that is gone by now no number is told, nor of one that doesn't press.
+    told.touches.slice(0, moment.touches.length).forEach((touch, i) => {
+      if (newtonsOf(touch) < LEAST_N) return;
+      const place = moment.touches[i];
+      out.push({ name: `contact ${i}`, at: at(place, 'point').add(this.arrowOf(place, 'force')), text: text(newtonsOf(touch)),
+                 colour: touch.slips ? '--slip' : '--stick', beside: [-78, -40], yields: i > 0 });
+    });
     if (told.hand_N > 0.3) {
       out.push({ name: 'hand', at: proxy.clone().sub(this.arrowOf(moment, 'force')), text: text(told.hand_N),
                  colour: '--hand', beside: [14, 6] });
     }
-    return out;
+    return out.sort((a, b) => Boolean(a.yields) - Boolean(b.yields));
   }
 }

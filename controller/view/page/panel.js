@@ -52,8 +52,8 @@ const ARM_FIGURES = [
 
 // All that press at once, each named once; the guide comes after the scene's objects.
 function name(stage, moment) {
-  const { objects, guide } = stage.scene, some = moment.contacts > 1 ? [moment.object_2, moment.object_3] : [];
-  const names = [moment.object, ...some.slice(0, moment.contacts - 1)].map((index) =>
+  const { objects, guide } = stage.scene;
+  const names = moment.touches.map(({ object: index }) =>
     objects[index]?.name ?? (guide && index === objects.length ? 'guide' : 'an object'));
   return [...new Set(names)].join(', ');
 }

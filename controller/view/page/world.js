@@ -23,6 +23,9 @@ const VIEWS = {
 const BAR_PX = 46;         // the buttons above, the legend below
 const USED_HEIGHT = 0.91;  // what the default arm takes of the picture's height in the overview, with room for an elbow that rises
 
+const LABEL_HEIGHT = 22;
+const overlap = ([left, top, right, bottom], [l, t, r, b]) => left < r && l < right && top < b && t < bottom;
+
 function drawnBySoftware() {
   const context = document.createElement('canvas').getContext('webgl');
   const details = context && context.getExtension('WEBGL_debug_renderer_info');
@@ -226,11 +229,10 @@ export class World {
   placeLabels() {
     const wanted = this.moment && this.told ? this.contacts.labels(this.moment, this.told) : [];
     const { width, height } = this;
-    const seen = new Set();
+    const seen = new Set(), taken = [];
     for (const label of wanted) {
       const p = label.at.project(this.camera);
       if (p.z > 1) continue;
-      seen.add(label.name);
       let element = this.labelElements.get(label.name);
       if (!element) {
         element = document.createElement('span');
@@ -245,6 +247,10 @@ export class World {
       element.style.color = colour(label.colour);
       const x = Math.min(width - this.labelWidths.get(label.name) - 4, Math.max(4, (0.5 + p.x / 2) * width + label.beside[0]));
       const y = Math.min(height - 26, Math.max(4, (0.5 - p.y / 2) * height + label.beside[1]));
+      const box = [x, y, x + this.labelWidths.get(label.name), y + LABEL_HEIGHT];
+      if (label.yields && taken.some((other) => overlap(box, other))) continue;
+      taken.push(box);
+      seen.add(label.name);
       element.style.transform = `translate(${x}px, ${y}px)`;
     }
     for (const [name, element] of this.labelElements) element.hidden = !seen.has(name);

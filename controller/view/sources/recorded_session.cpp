@@ -52,6 +52,7 @@ RecordedSession::RecordedSession(const std::filesystem::path& folder, Stage& sta
     : stage_(stage),
       log_(folder / controller::replay_folder / "cycles.bin"),
       signals_(folder, axis_names(stage)),
+      contacts_(folder),
       first_cycle_(signals_.row(0).cycle) {
   read_fault(folder);
   find_events();
@@ -88,10 +89,12 @@ void RecordedSession::find_events() {
   };
   fault_at_ = size();
   rendered_ns_.reserve(size());
+  time_ns_.reserve(size());
   for (std::size_t i = 0; i < size(); ++i) {
     const CycleRecord record = signals_.row(i);
     if (i > 0 && last.phase == Phase::rendering) rendered += record.time_ns - last.time_ns;
     rendered_ns_.push_back(rendered);
+    time_ns_.push_back(record.time_ns);
     if (record.phase != last.phase) add(RecordedEvent::Kind::phase, i, record, phase_words(record.phase).words);
     if (record.contact != controller::ContactPhase::free) {
       if (record.time_ns - touched_ns >= apart_ns) add(RecordedEvent::Kind::contact, i, record, "touches");
@@ -122,7 +125,7 @@ void RecordedSession::index_frames() {
   const bool driven = std::any_of(stage_.scene().objects.begin(), stage_.scene().objects.end(),
                                   [](const scenes::Object& o) { return o.motion && o.motion->driven; });
   if (driven) return follow_driven();
-  for (std::streamoff at = log_.position(); log_.skip(); at = log_.position()) positions_.push_back(at);
+  for (controller::ReplayPlace at = log_.position(); log_.skip(); at = log_.position()) positions_.push_back(at);
 }
 
 // Objects are moved cycle by cycle, as they were in the session.
@@ -131,7 +134,7 @@ void RecordedSession::follow_driven() {
   std::vector<controller::BoxFrame> frames;
   const std::size_t objects = stage_.scene().objects.size();
   driven_m_.assign(size() * objects, {});
-  for (std::streamoff at = log_.position(); log_.next(cycle, frames); at = log_.position()) {
+  for (controller::ReplayPlace at = log_.position(); log_.next(cycle, frames); at = log_.position()) {
     positions_.push_back(at);
     const std::uint64_t index = cycle.record.cycle - first_cycle_;
     if (cycle.record.cycle < first_cycle_ || index >= size()) continue;
@@ -145,13 +148,12 @@ void RecordedSession::follow_driven() {
   }
 }
 
-double RecordedSession::time_s(std::size_t index) const {
-  return 1e-9 * static_cast<double>(signals_.row(index).time_ns);
-}
+double RecordedSession::time_s(std::size_t index) const noexcept { return 1e-9 * static_cast<double>(time_ns_[index]); }
 
 Moment RecordedSession::moment(std::size_t index) const {
   Moment moment;
   moment.record = signals_.row(index);
+  contacts_.complete(moment.record);
   moment.handle_mass_kg = stage_.handle_mass_kg();
   moment.rendered_s = 1e-9 * static_cast<double>(rendered_ns_[index]);
   const std::size_t before = index > 0 ? index - 1 : index;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/record/replay_log.hpp"
+#include "controller/view/sources/contacts_file.hpp"
 #include "controller/view/sources/signals_file.hpp"
 #include "controller/view/stage/stage.hpp"
 
@@ -31,7 +32,8 @@ class RecordedSession {
   // The index to open the record at: the fault, else where a contact has lasted 0.1 s, else the end of the longest
   // contact, else the beginning.
   [[nodiscard]] std::size_t opening() const noexcept { return opening_; }
-  [[nodiscard]] double time_s(std::size_t index) const;
+  // For any thread.
+  [[nodiscard]] double time_s(std::size_t index) const noexcept;
   // The fault, as the black box or the summary tells it; empty if there was none.
   [[nodiscard]] const std::string& fault() const noexcept { return fault_; }
   // Whether moments of this cycle show the fault.
@@ -56,10 +58,12 @@ class RecordedSession {
   Stage& stage_;
   controller::ReplayReader log_;
   SignalsFile signals_;
-  std::uint64_t first_cycle_ = 0;               // number of the first row's cycle
-  std::vector<std::int64_t> rendered_ns_;       // time rendered before each cycle, since the record's beginning
-  std::vector<std::streamoff> positions_;       // of each cycle in the log, from its first one on
-  std::vector<std::array<float, 3>> driven_m_;  // of each cycle and object; empty if no object is driven
+  ContactsFile contacts_;
+  std::uint64_t first_cycle_ = 0;                   // number of the first row's cycle
+  std::vector<std::int64_t> time_ns_;               // of each cycle
+  std::vector<std::int64_t> rendered_ns_;           // time rendered before each cycle, since the record's beginning
+  std::vector<controller::ReplayPlace> positions_;  // of each cycle in the log, from its first one on
+  std::vector<std::array<float, 3>> driven_m_;      // of each cycle and object; empty if no object is driven
   std::vector<RecordedEvent> events_;
   std::size_t opening_ = 0, fault_at_ = 0;
   std::uint64_t fault_cycle_ = 0;

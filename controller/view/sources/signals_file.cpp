@@ -1,10 +1,5 @@
 #include "controller/view/sources/signals_file.hpp"
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -94,8 +89,9 @@ constexpr std::array singles{
     Named{"contacts",
           [](CycleRecord& r, std::size_t, const Field& f) { r.contact_count = number_of<std::uint8_t>(f); }},
     Named{"contact_object",
-          [](CycleRecord& r, std::size_t, const Field& f) { r.contact_object = number_of<std::int32_t>(f); }},
-    Named{"friction_1", store_value<&CycleRecord::friction>},
+          [](CycleRecord& r, std::size_t, const Field& f) { r.contacts[0].object = number_of<std::int32_t>(f); }},
+    Named{"friction_1",
+          [](CycleRecord& r, std::size_t, const Field& f) { r.contacts[0].friction = number_of<double>(f); }},
     Named{"proxy_mass_kg", store_value<&CycleRecord::proxy_mass_kg>},
     Named{"proxy_damping_Ns_per_m", store_value<&CycleRecord::proxy_damping_Ns_per_m>},
     Named{"proxy_inertia_kg_m2", store_value<&CycleRecord::proxy_inertia_kg_m2>},
@@ -118,7 +114,10 @@ constexpr std::array vectors{NamedVector{"force_S", "N", store_part<&CycleRecord
                              NamedVector{"p_hat_W", "m", store_part<&CycleRecord::p_hat_W_m>},
                              NamedVector{"proxy_W", "m", store_part<&CycleRecord::proxy_W_m>},
                              NamedVector{"contact_force_W", "N", store_part<&CycleRecord::contact_force_W_N>},
-                             NamedVector{"normal_W", "1", store_part<&CycleRecord::normal_W>},
+                             NamedVector{"normal_W", "1",
+                                         [](CycleRecord& r, std::size_t part, const Field& f) {
+                                           r.contacts[0].normal_W[part] = number_of<double>(f);
+                                         }},
                              NamedVector{"tool_W", "m", store_part<&CycleRecord::tool_W_m>},
                              NamedVector{"true_tool_W", "m", store_part<&CycleRecord::true_tool_W_m>},
                              NamedVector{"hand_force_W", "N", store_part<&CycleRecord::hand_force_W_N>},
@@ -134,28 +133,27 @@ struct OtherColumn {
 };
 
 OtherColumn column_of_other(std::string_view name) {
-  for (std::size_t i = 0; i < controller::other_contacts; ++i) {
-    const std::string number = std::to_string(i + 2);
+  for (std::size_t i = 1; i < controller::contacts_in_signals; ++i) {
+    const std::string number = std::to_string(i + 1);
     if (name == "contact_object_" + number) {
-      return {[](CycleRecord& r, std::size_t at, const Field& f) { r.others[at].object = number_of<std::int32_t>(f); },
-              i};
+      return {
+          [](CycleRecord& r, std::size_t at, const Field& f) { r.contacts[at].object = number_of<std::int32_t>(f); },
+          i};
     }
     if (name == "friction_" + number) {
-      return {[](CycleRecord& r, std::size_t at, const Field& f) { r.others[at].friction = number_of<double>(f); }, i};
+      return {[](CycleRecord& r, std::size_t at, const Field& f) { r.contacts[at].friction = number_of<double>(f); },
+              i};
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (name != "normal_" + number + "_W" + std::string(axes_in_names[axis]) + "1") continue;
       return {[](CycleRecord& r, std::size_t at, const Field& f) {
-                r.others[at / 3].normal_W[at % 3] = number_of<double>(f);
+                r.contacts[at / 3].normal_W[at % 3] = number_of<double>(f);
               },
               3 * i + axis};
     }
   }
   return {};
 }
-
-// The line that begins at `at`, without its end.
-std::string_view line_at(std::string_view text, std::size_t at) { return text.substr(at, text.find('\n', at) - at); }
 
 }  // namespace
 
@@ -185,51 +183,19 @@ SignalsFile::Column SignalsFile::column_named(std::string_view name, const std::
 
 SignalsFile::SignalsFile(const std::filesystem::path& folder, const std::vector<std::string>& axis_names) {
   std::error_code error;
-  if (!std::filesystem::exists(folder / "signals.bin", error)) {
-    read_text(folder / "signals.csv", axis_names);
-    return;
+  const bool as_table = std::filesystem::exists(folder / "signals.bin", error);
+  const std::filesystem::path file = folder / (as_table ? "signals.bin" : "signals.csv");
+  if (as_table) {
+    table_ = std::make_unique<controller::SignalTable>(file);
+    for (const auto& column : table_->columns()) columns_.push_back(column_named(column.name, axis_names));
+  } else {
+    text_ = std::make_unique<TextTable>(file, "cycle,time_s");
+    for (const std::string_view name : text_->names()) columns_.push_back(column_named(name, axis_names));
   }
-  table_ = std::make_unique<controller::SignalTable>(folder / "signals.bin");
-  for (const auto& column : table_->columns()) columns_.push_back(column_named(column.name, axis_names));
-  if (table_->rows() > 0) return;
-  throw SetupError({.file = (folder / "signals.bin").string(),
+  if (size() > 0) return;
+  throw SetupError({.file = file.string(),
                     .found = "a file without a cycle",
-                    .expected = "signals of a session that was recorded"});
-}
-
-void SignalsFile::read_text(const std::filesystem::path& file, const std::vector<std::string>& axis_names) {
-  const auto refuse = [&](const char* found) {
-    throw SetupError({.file = file.string(),
-                      .found = found,
-                      .expected = "signals.csv of a session that was recorded, or of a black box"});
-  };
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat status {};
-  if (descriptor < 0 || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) refuse("no such file");
-  const auto bytes = static_cast<std::size_t>(status.st_size);
-  void* const memory = bytes > 0 ? mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE, descriptor, 0) : MAP_FAILED;
-  close(descriptor);
-  if (memory == MAP_FAILED) refuse("an empty file");
-  text_ = {static_cast<const char*>(memory), bytes};
-
-  const std::string_view header = line_at(text_, 0);
-  for (std::size_t at = 0; at <= header.size();) {
-    const std::string_view name = header.substr(at, header.find(',', at) - at);
-    columns_.push_back(column_named(name, axis_names));
-    at += name.size() + 1;
-  }
-  if (header.substr(0, 12) != "cycle,time_s") refuse("another kind of file");
-  for (std::size_t at = header.size() + 1; at < bytes;) {
-    const std::size_t end = text_.find('\n', at);
-    if (end == std::string_view::npos) break;
-    rows_.push_back(at);
-    at = end + 1;
-  }
-  if (rows_.empty()) refuse("a file without a cycle");
-}
-
-SignalsFile::~SignalsFile() {
-  if (!text_.empty()) munmap(const_cast<char*>(text_.data()), text_.size());
+                    .expected = "signals of a session that was recorded, or of a black box"});
 }
 
 CycleRecord SignalsFile::row(std::size_t index) const {
@@ -238,14 +204,11 @@ CycleRecord SignalsFile::row(std::size_t index) const {
     add_from_table(record, index);
     return record;
   }
-  const std::string_view line = line_at(text_, rows_[index]);
-  std::size_t at = 0;
-  for (const Column& column : columns_) {
-    if (at > line.size()) break;
-    const std::string_view value = line.substr(at, line.find(',', at) - at);
-    if (column.store != nullptr) column.store(record, column.part, {.text = value});
-    at += value.size() + 1;
-  }
+  text_->visit(index, [&](std::size_t at, std::string_view text) {
+    if (at < columns_.size() && columns_[at].store != nullptr) {
+      columns_[at].store(record, columns_[at].part, {.text = text});
+    }
+  });
   return record;
 }
 

@@ -14,6 +14,7 @@
 
 #include "controller/record/cycle_record.hpp"
 #include "controller/signals/signal_table.hpp"
+#include "controller/view/sources/text_table.hpp"
 
 namespace proxarm::view {
 
@@ -21,11 +22,8 @@ class SignalsFile {
  public:
   // `axis_names` as in the cell. Throws SetupError if the folder has no signals of a record.
   SignalsFile(const std::filesystem::path& folder, const std::vector<std::string>& axis_names);
-  SignalsFile(const SignalsFile&) = delete;
-  SignalsFile& operator=(const SignalsFile&) = delete;
-  ~SignalsFile();
 
-  [[nodiscard]] std::size_t size() const noexcept { return table_ ? table_->rows() : rows_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return table_ ? table_->rows() : text_->rows(); }
   // All that the file contains of a cycle. Precondition: index < size().
   [[nodiscard]] controller::CycleRecord row(std::size_t index) const;
 
@@ -44,13 +42,11 @@ class SignalsFile {
   };
   [[nodiscard]] Column column_named(std::string_view name, const std::vector<std::string>& axis_names) const;
 
-  void read_text(const std::filesystem::path& file, const std::vector<std::string>& axis_names);
   void add_from_table(controller::CycleRecord& record, std::size_t index) const;
 
-  std::unique_ptr<controller::SignalTable> table_;  // null: text
-  std::string_view text_;
+  std::unique_ptr<controller::SignalTable> table_;
+  std::unique_ptr<TextTable> text_;  // null where there is a table
   std::vector<Column> columns_;
-  std::vector<std::uint64_t> rows_;  // where each begins
 };
 
 }  // namespace proxarm::view

@@ -245,6 +245,8 @@ std::string Stage::describe() const {
   JsonText json;
   json.begin_object().add("cell", cell_.name).name("fields").begin_list();
   for (const std::string& field : field_names()) json.value(field);
+  json.end().name("contact_fields").begin_list();
+  for (const std::string& field : contact_field_names()) json.value(field);
   put_links(json.end().name("links"), tree_);
   put_tool(json.name("tool"), cell_, tree_, scene_);
   put_scene(json.name("scene"), scene_, compiled_);

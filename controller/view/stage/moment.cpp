@@ -26,8 +26,8 @@ constexpr std::array fields{
     Field{"phase", [](const Moment& m) { return static_cast<double>(m.record.phase); }},
     Field{"contact", [](const Moment& m) { return static_cast<double>(m.record.contact); }},
     Field{"contacts", [](const Moment& m) { return static_cast<double>(m.record.contact_count); }},
-    Field{"object", [](const Moment& m) { return static_cast<double>(m.record.contact_object); }},
-    Field{"friction", [](const Moment& m) { return m.record.friction; }},
+    Field{"object", [](const Moment& m) { return static_cast<double>(m.record.contacts[0].object); }},
+    Field{"friction", [](const Moment& m) { return m.record.contacts[0].friction; }},
     Field{"flags", [](const Moment& m) { return static_cast<double>(m.record.flags); }},
     Field{"flags_since", [](const Moment& m) { return static_cast<double>(m.flags_since); }},
     Field{"fault", [](const Moment& m) { return static_cast<double>(m.record.fault); }},
@@ -62,7 +62,6 @@ constexpr std::array vectors{VectorField{"force", &CycleRecord::force_W_N},
                              VectorField{"proxy", &CycleRecord::proxy_W_m},
                              VectorField{"contact_force", &CycleRecord::contact_force_W_N},
                              VectorField{"contact_torque", &CycleRecord::contact_torque_W_Nm},
-                             VectorField{"normal", &CycleRecord::normal_W},
                              VectorField{"tool", &CycleRecord::tool_W_m}};
 
 template <typename Number>
@@ -113,12 +112,6 @@ const std::vector<std::string>& field_names() {
     for (const VectorField& vector : vectors) {
       for (const char* axis : {"_x", "_y", "_z"}) all.push_back(std::string(vector.name) + axis);
     }
-    for (std::size_t i = 0; i < controller::other_contacts; ++i) {
-      const std::string number = std::to_string(i + 2);
-      all.push_back("object_" + number);
-      all.push_back("friction_" + number);
-      for (const char* axis : {"_x", "_y", "_z"}) all.push_back("normal_" + number + axis);
-    }
     return all;
   }();
   return names;
@@ -130,17 +123,38 @@ void append_fields(std::vector<double>& row, const Moment& moment) {
     const Triple& value = moment.record.*vector.value;
     row.insert(row.end(), value.begin(), value.end());
   }
-  for (const controller::OtherContact& other : moment.record.others) {
-    row.push_back(other.object);
-    row.push_back(other.friction);
-    row.insert(row.end(), other.normal_W.begin(), other.normal_W.end());
+}
+
+const std::vector<std::string>& contact_field_names() {
+  static const std::vector<std::string> names{"object",   "part",    "slips",   "friction", "gap_m",
+                                              "point_x",  "point_y", "point_z", "normal_x", "normal_y",
+                                              "normal_z", "force_x", "force_y", "force_z"};
+  return names;
+}
+
+namespace {
+
+// In the order of contact_field_names().
+void append_contacts(std::vector<double>& row, const CycleRecord& record) {
+  row.push_back(static_cast<double>(record.recorded_contacts()));
+  for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
+    const controller::RecordedContact& contact = record.contacts[i];
+    const std::array numbers{static_cast<double>(contact.object), static_cast<double>(contact.part),
+                             contact.slips ? 1.0 : 0.0, contact.friction, contact.gap_m};
+    row.insert(row.end(), numbers.begin(), numbers.end());
+    for (const Triple* vector : {&contact.point_W_m, &contact.normal_W, &contact.force_W_N}) {
+      row.insert(row.end(), vector->begin(), vector->end());
+    }
   }
 }
+
+}  // namespace
 
 std::string encode_moment(const Moment& moment, std::span<const models::Pose> links,
                           std::span<const models::Pose> objects) {
   std::vector<double> row{kind_moment};
   append_fields(row, moment);
+  append_contacts(row, moment.record);
   std::string bytes;
   append<double>(bytes, row);
   for (const models::Pose& X : links) append_pose(bytes, X);

@@ -1,8 +1,10 @@
 // One moment of a session as a page draws it: numbers with names, and poses.
 //
 // The wire, little-endian as the machine is:
-//   double            kind: 1, a moment; 2, a history of moments without poses
+//   double            kind: 1, a moment; 2, a history of moments without contacts and poses
 //   double[fields]    the fields, in the order of field_names()
+//   double            number of contacts
+//   double[fields]    of each of them, in the order of contact_field_names()
 //   float[7 links]    x y z and quaternion x y z w of each of the arm's links in W
 //   float[7 objects]  displacement of each object of the scene from where the scene describes it
 // After the kind, a history has the number of its rows, and then the fields of each row.
@@ -48,6 +50,7 @@ class MomentBuilder {
 
 // The names of the fields in the order of the wire.
 [[nodiscard]] const std::vector<std::string>& field_names();
+[[nodiscard]] const std::vector<std::string>& contact_field_names();
 void append_fields(std::vector<double>& row, const Moment& moment);
 
 // A complete message.

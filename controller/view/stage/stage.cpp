@@ -8,6 +8,7 @@
 #include "models/base/setup_error.hpp"
 #include "scenes/compiler/obstacles.hpp"
 #include "scenes/mesh_files/mesh_file.hpp"
+#include "scenes/rigid/compile_rigid.hpp"
 
 namespace proxarm::view {
 namespace {
@@ -25,7 +26,11 @@ Stage::Stage(description::Cell cell, scenes::Scene scene, const StageOptions& op
       arm_(cell_),
       tree_(cell_),
       compiled_(scenes::compile(scene_)),
-      changes_(compiled_, options.period_s) {}
+      changes_(compiled_, options.period_s) {
+  if (scene_.tool && !scenes::why_not(scene_, scene_.tool->shape)) {
+    rigid_ = scenes::compile_rigid(scene_, scene_.tool->shape);
+  }
+}
 
 std::string Stage::mesh_bytes(int link, std::size_t index) const {
   if (link < 0) {
@@ -51,7 +56,9 @@ void Stage::follow(const controller::Change& change, bool rendered, double perio
 }
 
 void Stage::complete(CycleRecord& record, double rendered_s) const {
-  controller::add_clearances(record, scene_, std::llround(1e9 * rendered_s));
+  const std::int64_t rendered_ns = std::llround(1e9 * rendered_s);
+  if (rigid_) return controller::add_clearances(record, *rigid_, rendered_ns);
+  controller::add_clearances(record, scene_, rendered_ns);
 }
 
 Pose Stage::tool_pose(std::span<const Pose> links) const noexcept {

@@ -13,6 +13,7 @@
 #include "models/arm/arm.hpp"
 #include "models/arm/link_tree.hpp"
 #include "models/description/cell.hpp"
+#include "models/geometry/pose_algorithm.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene.hpp"
 
@@ -47,7 +48,7 @@ class Stage {
   // rendered.
   void follow(const controller::Change& change, bool rendered, double period_s) noexcept;
 
-  // Adds distances that only the scene knows and that the cycle doesn't compute.
+  // Adds the distances of proxy and tool, with the tool's shape where there is one: the cycle doesn't compute them.
   void complete(controller::CycleRecord& record, double rendered_s) const;
   // A driven object's displacement from where the scene describes it, after all calls of follow().
   [[nodiscard]] models::Vec3 driven_m(std::size_t object) const noexcept {
@@ -69,6 +70,7 @@ class Stage {
   models::LinkTree tree_;
   scenes::CompiledScene compiled_;  // only for the changes to its objects
   controller::SceneChanges changes_;
+  std::unique_ptr<models::PoseAlgorithm> rigid_;  // for a tool's distances; null: a point is rendered
 };
 
 }  // namespace proxarm::view

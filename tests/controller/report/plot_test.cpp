@@ -47,7 +47,7 @@ void fill(PlotBuilder& plot, int cycles, bool contact = true) {
     if (touching && s < 0.3 + 1.5 / cycles) r.contact_force_W_N[2] = 800.0;  // the impact's step
     if (touching) {
       r.contact = sliding ? ContactPhase::slip : ContactPhase::stick;
-      r.normal_W = {0.0, 0.0, 1.0};
+      r.contacts[0].normal_W = {0.0, 0.0, 1.0};
     }
     plot.add(r);
   }

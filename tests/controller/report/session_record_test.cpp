@@ -59,7 +59,7 @@ TEST(SessionRecord, EveryColumnHasAName) {
 }
 
 TEST(SessionRecord, EveryColumnHasAMeaning) {
-  const nlohmann::json columns = nlohmann::json::parse(columns_json(six_axes, true));
+  const nlohmann::json columns = nlohmann::json::parse(json_of(signal_columns(six_axes, true)));
   std::string header;
   for (const nlohmann::json& column : columns) {
     header += (header.empty() ? "" : ",") + column.at("name").get<std::string>();
@@ -107,7 +107,7 @@ TEST(SessionRecord, NumbersOfATableAreThoseOfTheText) {
   std::mt19937_64 generator(18);
   std::printf("seed 18\n");
   std::vector<std::string> expected;
-  SignalTableWriter writer(folder / "signals.bin", signal_columns(six_axes, true));
+  SignalTableWriter writer(folder / "signals.bin", signal_columns(six_axes, true), SignalTableWriter::Blocks::plain);
   for (std::uint64_t k = 0; k < 3000; ++k) {
     CycleRecord r = some_record(generator() >> 11);
     r.time_ns = static_cast<std::int64_t>(generator() >> (13 + generator() % 40));
@@ -117,12 +117,13 @@ TEST(SessionRecord, NumbersOfATableAreThoseOfTheText) {
     for (Triple* triple : {&r.force_W_N, &r.tool_W_m, &r.hand_force_W_N}) {
       for (double& value : *triple) value = std::bit_cast<double>(generator());
     }
-    r.others[1].object = static_cast<std::int32_t>(generator());
+    r.contacts[2].object = static_cast<std::int32_t>(generator());
     DerivedSignals derived;
     derived.torques = k % 2 == 0;
     derived.target_Nm[2] = std::bit_cast<double>(generator());
     append_signals(expected.emplace_back(), r, 6, true, derived);
-    writer.add(r, 6, true, derived);
+    store_signals(writer.row(), SignalTableWriter::apart, r, 6, true, derived);
+    writer.end_row();
     if (k % 97 != 0) continue;
     // What a session that is killed now leaves: 64 rows at a time, each whole.
     const SignalTable table(folder / "signals.bin");
@@ -146,7 +147,8 @@ TEST(SessionRecord, NumbersOfATableAreThoseOfTheText) {
 
 TEST(SessionRecord, ATableTellsOfAFullDisk) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  EXPECT_EQ(SignalTableWriter("/dev/full", signal_columns(six_axes, true)).error(), ENOSPC);
+  EXPECT_EQ(SignalTableWriter("/dev/full", signal_columns(six_axes, true), SignalTableWriter::Blocks::plain).error(),
+            ENOSPC);
 }
 
 // Written by hand in candump -L's format (can-utils, lib.c: "id#data", "id##flags data", "id#R", 8 digits when

@@ -62,8 +62,8 @@ struct Session {
     r.tool_clearance_m = contact ? -tool_depth_m : 0.01;
     if (contact) {
       r.contact = ContactPhase::slip;
-      r.friction = friction;
-      r.normal_W = {0.0, 0.0, 1.0};
+      r.contacts[0].friction = friction;
+      r.contacts[0].normal_W = {0.0, 0.0, 1.0};
       r.contact_force_W_N = {-slide, 0.0, normal + force_error_N};
     }
     return r;

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "models/base/setup_error.hpp"
+#include "models/packed/packed.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace proxarm::view {
@@ -34,6 +35,16 @@ std::vector<Record> records_in(const std::string& bytes, std::size_t from, std::
   }
   EXPECT_EQ(from, to);
   return all;
+}
+
+// Of a chunk: its records, unpacked.
+std::string content_of(const std::string& bytes, const Record& chunk) {
+  const auto size = number_at<std::uint64_t>(bytes, chunk.begins + 16);
+  const std::size_t name = chunk.begins + 28;
+  EXPECT_EQ(bytes.substr(name + 4, number_at<std::uint32_t>(bytes, name)), "zstd");
+  const auto packed = number_at<std::uint64_t>(bytes, name + 8);
+  EXPECT_EQ(name + 16 + packed, chunk.begins + chunk.size);
+  return models::unpacked(std::string_view(bytes).substr(name + 16, packed), size).value_or("");
 }
 
 struct Written {
@@ -68,8 +79,8 @@ TEST(McapWriter, IsASequenceOfRecordsWithAnIndexAtItsEnd) {
     if (record.op == 0x08) ++indexed;
     if (record.op != 0x06) continue;
     ++chunks;
-    const std::size_t content = record.begins + 8 + 8 + 8 + 4 + 4 + 8;
-    for (const Record& inner : records_in(written.bytes, content, record.begins + record.size)) {
+    const std::string content = content_of(written.bytes, record);
+    for (const Record& inner : records_in(content, 0, content.size())) {
       if (inner.op == 0x05) ++messages;
     }
   }
@@ -81,17 +92,18 @@ TEST(McapWriter, IsASequenceOfRecordsWithAnIndexAtItsEnd) {
 TEST(McapWriter, AnIndexLeadsToItsMessage) {
   Written written;
   write(written, 10);
-  std::size_t chunk = 0;
+  std::string chunk;
   int found = 0;
   for (const Record& record : written.records) {
-    if (record.op == 0x06) chunk = record.begins + 40;
+    if (record.op == 0x06) chunk = content_of(written.bytes, record);
     if (record.op != 0x07) continue;
     const auto channel = number_at<std::uint16_t>(written.bytes, record.begins);
     for (std::size_t at = record.begins + 6; at < record.begins + record.size; at += 16) {
-      const std::size_t message = chunk + number_at<std::uint64_t>(written.bytes, at + 8);
-      EXPECT_EQ(written.bytes[message], 0x05);
-      EXPECT_EQ(number_at<std::uint16_t>(written.bytes, message + 9), channel);
-      EXPECT_EQ(number_at<std::uint64_t>(written.bytes, message + 15), number_at<std::uint64_t>(written.bytes, at));
+      const auto message = number_at<std::uint64_t>(written.bytes, at + 8);
+      ASSERT_LT(message, chunk.size());
+      EXPECT_EQ(chunk[message], 0x05);
+      EXPECT_EQ(number_at<std::uint16_t>(chunk, message + 9), channel);
+      EXPECT_EQ(number_at<std::uint64_t>(chunk, message + 15), number_at<std::uint64_t>(written.bytes, at));
       ++found;
     }
   }
