@@ -307,36 +307,38 @@ json Fidelity::headline(const Table& table, const Options& /*options*/) const {
 
 namespace {
 
-// Of each job and frequency the row of the direction in which the error is largest.
-std::vector<bool> worst_rows(const Table& table) {
-  std::vector<bool> worst(table.rows(), false);
-  std::map<std::pair<std::size_t, double>, std::size_t> of;
+// Of each job and frequency, in this order, the row of the direction in which the error is largest.
+std::vector<std::size_t> worst_rows(const Table& table) {
+  std::map<std::pair<std::size_t, double>, std::size_t> worst;
   const auto error = [&](std::size_t row) {
     return table.number(row, table.column(is_turning(table, row) ? "inertia_error" : "mass_error"));
   };
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const auto [at, is_new] =
-        of.emplace(std::pair{table.job(row), table.number(row, table.column("frequency_Hz"))}, row);
-    if (is_new || error(row) > error(at->second)) {
-      worst[at->second] = false;
-      at->second = row;
-    }
-    worst[at->second] = true;
+        worst.emplace(std::pair{table.job(row), table.number(row, table.column("frequency_Hz"))}, row);
+    if (!is_new && error(row) > error(at->second)) at->second = row;
   }
-  return worst;
+  std::vector<std::size_t> rows;
+  for (const auto& [job_and_frequency, row] : worst) rows.push_back(row);
+  return rows;
 }
 
-// One for each job whose rows are `drawn`, of what `y` says of a row. Drives of half the speed feel the same, to some
-// tenths of a per cent: they aren't drawn. `styles`: of each label.
+// Whether it is drawn. Drives of half the speed and other timesteps feel the same, to some tenths of a per cent, and 2
+// kg aren't stable in all poses.
+bool is_shown(const Table& table, std::size_t row) {
+  const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
+  if (value("drive_factor") != 1.0) return false;
+  return value("wall") != 0.0 || (value("period_s") == 1e-3 && value("mass_kg") != 2.0);
+}
+
+// One for each job whose rows are `drawn`, of what `y` says of a row. `styles`: of each label.
 template <typename Drawn, typename Value>
 std::vector<Curve> curves(const Table& table, Drawn drawn, Value y, std::map<std::string, int>& styles) {
   std::vector<Curve> list;
   std::map<std::size_t, std::size_t> of_job;
-  const std::vector<bool> worst = worst_rows(table);
-  for (std::size_t row = 0; row < table.rows(); ++row) {
+  for (const std::size_t row : worst_rows(table)) {
     const double value = y(row);
-    if (!worst[row] || !drawn(row) || !std::isfinite(value) || table.number(row, table.column("drive_factor")) != 1.0)
-      continue;
+    if (!is_shown(table, row) || !drawn(row) || !std::isfinite(value)) continue;
     const auto [at, is_new] = of_job.emplace(table.job(row), list.size());
     if (is_new) {
       const std::string name = label(table, row);
@@ -350,6 +352,14 @@ std::vector<Curve> curves(const Table& table, Drawn drawn, Value y, std::map<std
   return list;
 }
 
+// Level lines where the error is 5, 10 and 25 %.
+void add_limits(Panel& panel) {
+  constexpr int faint = 7;
+  for (const double limit : limits) {
+    panel.curves.push_back({.x = {frequencies_Hz.front(), frequencies_Hz.back()}, .y = {limit, limit}, .style = faint});
+  }
+}
+
 // Error, size and phase of F/a, or of torque and angular acceleration.
 template <typename Drawn>
 std::vector<Panel> free_panels(const Table& table, Drawn drawn, bool turning, std::map<std::string, int>& styles) {
@@ -360,7 +370,7 @@ std::vector<Panel> free_panels(const Table& table, Drawn drawn, bool turning, st
   const char *const real = turning ? "inertia_real_kg_m2" : "mass_real_kg", *const imaginary =
                                                                                 turning ? "inertia_imag_kg_m2"
                                                                                         : "mass_imag_kg";
-  Panel error{.title = where + "error against the wanted " + what,
+  Panel error{.title = where + "error against the wanted " + what + " (lines: 5, 10, 25 %)",
               .x_label = "frequency (Hz)",
               .y_label = std::string("|") + ratio + " − " + asked + "|/" + asked,
               .log_x = true,
@@ -381,6 +391,7 @@ std::vector<Panel> free_panels(const Table& table, Drawn drawn, bool turning, st
               .y_high = 180.0};
   const auto of_rows = [&](auto y) { return curves(table, drawn, y, styles); };
   error.curves = of_rows([&](std::size_t row) { return value(row, turning ? "inertia_error" : "mass_error"); });
+  add_limits(error);
   size.curves =
       of_rows([&](std::size_t row) { return value(row, real) / value(row, turning ? "inertia_kg_m2" : "mass_kg"); });
   phase.curves = of_rows(
