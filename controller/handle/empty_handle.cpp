@@ -85,10 +85,8 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
       way_.start();
     }
   } else {
-    // What looked like noise during the tare may have been a hand's motion, so nothing is known of the noise.
-    const double noise_N = signs.noise_is_white ? signs.noise_N : 0.0;
     if (signs.at_handle) way_.start();
-    s.led = way_.step({signs.hand_W.force, signs.v_W, signs.mass_kg, noise_N, T});
+    s.led = way_.step({signs.hand_W.force, signs.v_W, signs.mass_kg, signs.noise_N, T, signs.left_by_tare});
     if (s.led) s.bias_W = way_.line_W();
     const double ways = config_.way_share / speed;
     s.empty = s.led || s.calm_s >= std::clamp(calm_way_m * ways, shortest_calm_s, longest_s) ||

@@ -49,6 +49,7 @@ struct HandSigns {
   const models::Vec3& v_W;       // of the proxy, in its last step
   double mass_kg = 0.0;          // of the proxy
   bool at_handle = false;        // the force acts at the handle
+  bool left_by_tare = false;     // it is what a hand left in the tare
 };
 
 class EmptyHandle {

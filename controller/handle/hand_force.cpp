@@ -13,10 +13,14 @@ using models::Wrench;
 constexpr double filter_s = 0.015;
 // Below this force, its line of action isn't known well enough: half of it would be the uncertainty of its lever.
 constexpr double least_N = 0.3, least_noises = 20.0;
+// A force is what the tare has left to this share of it: the hand leaned on as the tare went on.
+constexpr double left_share = 0.3;
+constexpr double least_left = 0.3;  // of the force that is large enough for its line: the tare's mean is known better
 
 }  // namespace
 
-void HandForce::step(const Wrench& reading_W, const Mat3& R_WS, const Vec3& v_W, double noise_N) noexcept {
+void HandForce::step(const Wrench& reading_W, const Mat3& R_WS, const Vec3& v_W, double noise_N,
+                     const Vec3& beside_zero_S) noexcept {
   State& s = state_;
   const double T = period_s_, lag = T / (T + lag_s_ / 3.0), share = T / (T + filter_s);
   s.a1_W += lag * ((v_W - s.v_k1_W) / T - s.a1_W);
@@ -29,7 +33,10 @@ void HandForce::step(const Wrench& reading_W, const Mat3& R_WS, const Vec3& v_W,
   s.calm_W.force += share * (s.wrench_W.force - s.calm_W.force);
   s.calm_W.torque += share * (s.wrench_W.torque - s.calm_W.torque);
   const double calm_noise_N = noise_N * std::sqrt(T / (2.0 * filter_s));
-  s.at_handle = s.calm_W.force.norm() >= std::max(least_N, least_noises * calm_noise_N) &&
+  const double large_N = std::max(least_N, least_noises * calm_noise_N);
+  s.left_by_tare = s.calm_W.force.norm() >= least_left * large_N &&
+                   (s.calm_W.force + R_WS * beside_zero_S).norm() <= left_share * beside_zero_S.norm();
+  s.at_handle = !s.left_by_tare && s.calm_W.force.norm() >= large_N &&
                 acts_at_handle(s.calm_W, R_WS * tool_.handle_S, calm_noise_N);
 }
 

@@ -14,6 +14,10 @@
 // force acts at the handle if its torque is at most a third of that, too. It can be told where |p × F| is three times
 // what isn't known of τ.
 //
+// A hand that pushed while the sensor was tared, and was taken for its zero, leaves the opposite of its force when it
+// lets go, and that acts at the handle as it did. So a force that is what the tare differs from the known zero by is
+// none that can be told.
+//
 // Neither allocates, locks nor throws.
 #pragma once
 
@@ -63,14 +67,17 @@ class HandForce {
     lag_s_ = lag_s;
   }
   void set_tool(const HeldTool& tool) noexcept { tool_ = tool; }
-  // Once in each cycle. reading_W: about T's origin, without bias and tool weight; v_W: the proxy's, in its last step.
-  void step(const models::Wrench& reading_W, const models::Mat3& R_WS, const models::Vec3& v_W,
-            double noise_N) noexcept;
+  // Once in each cycle. reading_W: about T's origin, without bias and tool weight; v_W: the proxy's, in its last step;
+  // beside_zero_S: by which the tare differs from the known zero.
+  void step(const models::Wrench& reading_W, const models::Mat3& R_WS, const models::Vec3& v_W, double noise_N,
+            const models::Vec3& beside_zero_S) noexcept;
 
   // Without the tool's inertia.
   [[nodiscard]] const models::Wrench& wrench_W() const noexcept { return state_.wrench_W; }
   // What moves it acts at the handle, as a load or a hand does, and is large enough to tell.
   [[nodiscard]] bool at_handle() const noexcept { return state_.at_handle; }
+  // It is what a hand that is gone left in the tare.
+  [[nodiscard]] bool left_by_tare() const noexcept { return state_.left_by_tare; }
   [[nodiscard]] double tool_mass_kg() const noexcept { return tool_.mass_kg; }
 
   void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
@@ -80,7 +87,7 @@ class HandForce {
     models::Wrench wrench_W, calm_W;  // calm_W: behind a low-pass
     models::Vec3 v_k1_W = models::Vec3::Zero();
     models::Vec3 a1_W = models::Vec3::Zero(), a2_W = models::Vec3::Zero(), a3_W = models::Vec3::Zero();
-    bool at_handle = false;
+    bool at_handle = false, left_by_tare = false;
   };
 
   HeldTool tool_;

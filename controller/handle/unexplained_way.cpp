@@ -33,6 +33,7 @@ bool UnexplainedWay::leads(const LedHandle& now, const FittedLine& line) const n
   const Vec3 mean_W = s.fit.first_W + s.fit.h / s.fit.n;
   const double mean_N = mean_W.norm(), lasted_s = s.fit.n * now.period_s;
   if (!(line.end_W.dot(now.v_W) > 0.0) || !(now.mass_kg > 0.0)) return false;
+  if (now.left_by_tare) return true;
   const double gained = now.mass_kg * (now.v_W - s.first_v_W).dot(mean_W) / mean_N;
   const bool accelerates = gained >= accelerated_share * mean_N * lasted_s;
   const double now_N = line.end_W.norm();

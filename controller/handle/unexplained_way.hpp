@@ -16,6 +16,7 @@
 //     the force has accelerated the proxy by at least half as much as in free space.
 //   - A bias of whatever size and beginning, also one that drifts: the line has lasted for a second, with the same
 //     acceleration.
+//   - What a hand has left in the tare (hand_force.hpp).
 //
 // A moving hand's force is straight for a tenth of a second now and then. That of a hand without tremor which begins to
 // pull is straight for half a second, at some newtons.
@@ -36,6 +37,7 @@ struct LedHandle {
   double mass_kg = 0.0;
   double noise_N = 0.0;  // σ
   double period_s = 0.0;
+  bool left_by_tare = false;
 };
 
 class UnexplainedWay {

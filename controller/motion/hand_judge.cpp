@@ -51,14 +51,15 @@ void HandJudge::start() noexcept {
 models::Wrench HandJudge::step(const MotionCycle& cycle, const ProxyMotion& proxy) noexcept {
   let_in(cycle.record);
   const Measured& measured = cycle.measured;
-  hand_.step(measured.hand_W, measured.R_WS, proxy.v_W, measured.bias.noise_N);
+  hand_.step(measured.hand_W, measured.R_WS, proxy.v_W, measured.bias.noise_N, measured.bias.beside_zero_S);
   const models::Wrench hand_W{share_ * measured.hand_W.force, share_ * measured.hand_W.torque};
   if (!empty_) {
     judge(cycle, proxy, false);
     return hand_W;
   }
-  const bool empty =
-      empty_->step(hand_signs(hand_.wrench_W(), measured.bias, proxy.v_W, proxy.mass_kg, hand_.at_handle()));
+  HandSigns signs = hand_signs(hand_.wrench_W(), measured.bias, proxy.v_W, proxy.mass_kg, hand_.at_handle());
+  signs.left_by_tare = hand_.left_by_tare();
+  const bool empty = empty_->step(signs);
   cycle.record.set(RecordFlag::hands_off, empty);
   judge(cycle, proxy, empty && !empty_->led());
   if (!empty) return hand_W;

@@ -98,11 +98,13 @@ void Measurement::finish_tare() noexcept {
   Measured& now = state_.measured;
   compensation_.finish_tare();
   const double samples = compensation_.tare_samples();
-  now.bias = {.noise_N = compensation_.noise_N(),
+  const double noise_N = compensation_.noise_N();
+  now.bias = {.noise_N = compensation_.noise_is_white() ? noise_N : std::min(noise_N, compensation_.step_noise_N()),
               .noise_is_white = compensation_.noise_is_white(),
               .samples = samples,
               .sample_cycles = state_.tare_cycles / samples,
-              .drift_N = 0.0};
+              .drift_N = 0.0,
+              .beside_zero_S = Vec3::Zero()};
   now.hand_W = compensation_.hand_wrench_W(now.reading_S, now.R_WS);
 }
 
@@ -117,6 +119,7 @@ bool Measurement::tare(const SessionSettings& settings, double tared_for_s, Alar
   finish_tare();
   const Vec3 standing_S = compensation_.bias_S().force - Vec3(settings.zero_S_N.data());
   const double limit_N = standing_limit_N(settings);
+  if (std::isfinite(settings.zero_drift_N)) state_.measured.bias.beside_zero_S = standing_S;
   if (standing_S.norm() <= limit_N) return true;
   alarm.raise_standing(state_.measured.R_WS * standing_S, limit_N);
   return false;
@@ -128,8 +131,7 @@ double Measurement::standing_limit_N(const SessionSettings& settings) const noex
 }
 
 double Measurement::tare_error_N() const noexcept {
-  const SensorBias& bias = state_.measured.bias;
-  return tare_deviations * bias.noise_N / std::sqrt(std::max(1.0, bias.samples));
+  return tare_deviations * compensation_.noise_N() / std::sqrt(std::max(1.0, state_.measured.bias.samples));
 }
 
 ToolEvidence Measurement::tool_evidence(const HeldTool& wanted, const SessionSettings& settings) const noexcept {

@@ -25,11 +25,16 @@ namespace proxarm::controller {
 
 // What taring the sensor has shown of its noise and bias, and how the bias has drifted since.
 struct SensorBias {
-  double noise_N = 0.0;        // standard deviation of a sample, in the noisiest axis
+  // Standard deviation of a sample, in the noisiest axis; where it isn't white, what of it changes from sample to
+  // sample: a hand that trembled meanwhile doesn't make the session deaf.
+  double noise_N = 0.0;
   bool noise_is_white = true;  // each sample is independent of the one before: nobody moved the handle
   double samples = 0.0;        // the number of samples that the bias is the mean of
   double sample_cycles = 1.0;  // cycles from one sample to the next
   double drift_N = 0.0;        // how far the bias has drifted while nobody held the handle
+  // By which the tare's mean differs from the known zero: drift, or what stood at the handle and was taken for zero.
+  // Zero where none is known.
+  models::Vec3 beside_zero_S = models::Vec3::Zero();
 };
 
 // The measurements of one cycle. Joint vectors and bits of joints are in the order of the arm's joints.

@@ -81,6 +81,11 @@ double WrenchCompensation::noise_N() const noexcept {
   return std::sqrt(std::max(0.0, tare_variance_S().maxCoeff()));
 }
 
+double WrenchCompensation::step_noise_N() const noexcept {
+  if (tare_count_ < 2) return 0.0;
+  return std::sqrt(tare_steps_S_.maxCoeff() / (2.0 * (tare_samples() - 1.0)));
+}
+
 // Von Neumann's ratio (J. von Neumann, Distribution of the ratio of the mean square successive difference to the
 // variance, 1941), here Σ(xᵢ₊₁ − xᵢ)² over twice the sum of squares Σ(xᵢ − x̄)². It is 1 to within 1/√n for white
 // noise. For a motion at ω it is (ωT)²/2, which is 2 % at 30 Hz and 1 ms. Behind a first-order filter it is 1 −

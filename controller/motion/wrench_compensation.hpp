@@ -37,6 +37,8 @@ class WrenchCompensation {
   // The standard deviation of a single tare sample's force in the noisiest axis, in N. Precondition: finish_tare() was
   // called.
   [[nodiscard]] double noise_N() const noexcept;
+  // The same by how samples differ from the ones before: of a hand's slow motion nothing is in it.
+  [[nodiscard]] double step_noise_N() const noexcept;
   // False if successive samples are correlated, as a hand's motion or the sensor's own filter makes them.
   [[nodiscard]] bool noise_is_white() const noexcept;
   [[nodiscard]] double tare_samples() const noexcept { return static_cast<double>(tare_count_); }

@@ -153,6 +153,28 @@ class Handle(harness.ProgramTest):
         self.assertIn("force_at_start", told.err)
         self.assertFalse(cell.with_name("default.yaml.zero").exists())
 
+    def test_a_lean_too_weak_to_be_refused_leads_nothing_away_once_it_is_let_go(self):
+        """The story: 0.3 to 3 N that stood at the handle while the sensor was tared led the empty arm by 1.2 to 1.8 m."""
+        for newtons in (0.3, 0.5, 1.0, 3.0):
+            with self.subTest(f"{newtons} N"):
+                lean = self.force((0, (0, newtons, 0)), (2.0, (0, newtons, 0)), (2.2, (0, 0, 0)), (9, (0, 0, 0)))
+                outcome, track = self.session(lean, duration="8s")
+                gone = max(k for k, force in enumerate(track.hand_N) if math.hypot(*force) > 0)
+                way = self.way(track, gone)
+                print(f"{newtons} N in the tare: {1e3 * way:.1f} mm, {self.faults(outcome)}", flush=True)
+                self.assertLess(way, 0.05)
+                self.assertEqual(self.faults(outcome), ["sensor_drifts"])
+
+    def test_a_hand_that_trembles_while_the_sensor_is_tared_makes_the_session_deaf_to_nothing(self):
+        """The story: its motion was taken for the sensor's noise, and an offset of 10 N that jumped in led by 1.3 m."""
+        trembles = LEADS_AND_LETS_GO + "multisine:\n  - {frequency_Hz: 8, amplitude_m: 0.001, direction: [0.6, 0, 0.8]}\n"
+        for fault in ("offset=2N", "offset=5N", "offset=10N"):
+            with self.subTest(fault):
+                faults, after_s, off_m = self.jumped(trembles, fault, at_s=2.0)
+                self.assertEqual(faults, ["force_jumped"])
+                self.assertLess(after_s, 0.2)
+                self.assertLess(off_m, 0.05)
+
     # ---- the tool's inertia
 
     def test_damping_never_lets_an_empty_handle_run_further(self):

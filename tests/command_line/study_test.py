@@ -40,9 +40,15 @@ class Study(ProgramTest):
         self.assertEqual(self.call("study", "fidelity", "--quick", "--out", "out").status, 0)
         figures = self.figures("fidelity", "out")
         self.assertEqual(figures["ended_by_fault"], 0)
-        by_setup = figures["apparent_mass_error_by_setup"]
-        for frequency, at_most in (("2", 0.02), ("5", 0.07), ("10", 0.2)):  # what the project has promised
-            self.assertLessEqual(by_setup["10 kg, T = 1 ms, lookahead"][frequency], at_most)
+        by_setup, ahead = figures["apparent_mass_error_by_setup"], "10 kg, T = 1 ms, lookahead"
+        along = figures["apparent_mass_error_by_direction"][ahead]
+        self.assertEqual(set(along), {"x", "y", "z"})
+        # What the project has promised: along x all of it, in the worst direction up to 5 Hz. There, at 10 Hz it is the
+        # gears' give, 26 % in docs/studies.md.
+        for frequency, along_x, at_worst in (("2", 0.02, 0.02), ("5", 0.07, 0.07), ("10", 0.2, 0.27)):
+            self.assertLessEqual(along["x"][frequency], along_x)
+            self.assertLessEqual(by_setup[ahead][frequency], at_worst)
+            self.assertEqual(by_setup[ahead][frequency], max(error[frequency] for error in along.values()))
         # Without it: the loop's 16.6 ms alone would be 2 sin(pi f L) = 0.21 at 2 Hz.
         self.assertGreater(by_setup["10 kg, T = 1 ms"]["2"], 0.1)
         self.assertLess(by_setup["10 kg, T = 1 ms"]["2"], 0.21)

@@ -17,7 +17,7 @@ using models::JointVector;
 using models::Vec3;
 
 constexpr int poses = 20000;
-constexpr std::size_t tried = 600;  // of them, whether the hand's way can be gone
+constexpr std::size_t tried = 2000;  // of them, whether the hand's way can be gone
 // Of that way, per metre of reach up to one: less than what a call of the inverse kinematics may turn joints by.
 constexpr double step_share = 2e-3;
 constexpr double another_rad = 0.3;  // m of a joint that slides: half of the way of a hand
