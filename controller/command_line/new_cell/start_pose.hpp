@@ -19,11 +19,12 @@ description::HandDescription with_shorter_way(description::HandDescription hand,
 // Of a tool that moves in a plane or on a line: ahead is along its first axis, and to the side along the second.
 description::HandDescription with_way_in(const models::ToolSpace& space, description::HandDescription hand);
 
-// The best of some thousand poses all over the joints' ranges. Good is: a place that can be moved well in all directions
-// (place_margin.hpp) with a wrist that is far from its singularity, all joints far from their ends, the tool in front of the base at a height of a fifth to four fifths of the reach and pointing
-// forwards or down, and the joints above the floor. Of these it is the first one from which the hand's whole way can be
-// gone; where there is none, half of it or less. Further ones follow, up to `most`, each of which has a joint that is
-// turned by 0.3 rad (or moved by 0.3 m) from all before.
+// The best of some thousand poses all over the joints' ranges. Good is: a place that can be moved well in all
+// directions (place_margin.hpp) with a wrist that is far from its singularity, all joints far from their ends, the tool
+// in front of the base at a height of a fifth to four fifths of the reach and pointing forwards or down, and the joints
+// above the floor. Of these it is the first one from which the hand's whole way can be gone, straight ahead of an
+// upright first joint, else wherever that joint has it; where there is none, half of it or less. Further ones follow,
+// up to `most`, each of which has a joint that is turned by 0.3 rad (or moved by 0.3 m) from all before.
 std::vector<StartPose> find_starts(const models::Arm& arm, const description::HandDescription& hand, std::size_t most);
 
 // The axis of the sensor that points out of the arm, in its link: that of the last joint that turns (of a last one that
