@@ -131,7 +131,7 @@ Json felt_mass(const Summary& s) {
 
 constexpr std::array<std::pair<const char*, double>, 3> felt_limits{{{"5 %", 0.05}, {"10 %", 0.1}, {"25 %", 0.25}}};
 
-constexpr std::array axis_names{"x", "y", "z"};
+constexpr std::array space_axes{"x", "y", "z"};
 
 Json felt_bands(const std::vector<FeltMassCurve::Point>& felt_mass, double wanted_kg) {
   if (felt_mass.empty() || !(wanted_kg > 0.0)) return nullptr;
@@ -142,8 +142,8 @@ Json felt_bands(const std::vector<FeltMassCurve::Point>& felt_mass, double wante
 
 Json felt_bands_along(const Summary& s) {
   Json along;
-  for (std::size_t axis = 0; axis < axis_names.size(); ++axis) {
-    along[axis_names[axis]] = felt_bands(s.felt_mass_along[axis], s.wanted_mass_kg);
+  for (std::size_t axis = 0; axis < space_axes.size(); ++axis) {
+    along[space_axes[axis]] = felt_bands(s.felt_mass_along[axis], s.wanted_mass_kg);
   }
   return along;
 }
@@ -329,10 +329,10 @@ void tell_time(const Summary& s, Lines& line) {
 std::string felt_along(const Summary& s) {
   const auto& [name, limit] = felt_limits[1];
   std::vector<std::pair<double, const char*>> along;
-  for (std::size_t axis = 0; axis < axis_names.size(); ++axis) {
+  for (std::size_t axis = 0; axis < space_axes.size(); ++axis) {
     const std::vector<FeltMassCurve::Point>& felt_mass = s.felt_mass_along[axis];
     if (felt_mass.empty()) continue;
-    along.emplace_back(band_within_Hz(felt_mass, s.wanted_mass_kg, limit), axis_names[axis]);
+    along.emplace_back(band_within_Hz(felt_mass, s.wanted_mass_kg, limit), space_axes[axis]);
   }
   std::sort(along.begin(), along.end());
   std::string text;
