@@ -32,8 +32,17 @@ TEST(Moment, IsOnTheWireWhereItsNamesSay) {
   moment.handle_mass_kg = 0.25;
   models::Pose X = models::Pose::Identity();
   X.translation() = models::Vec3(1, 2, 3);
+  moment.record.contact_count = 1;
+  moment.record.contacts[0] = {.object = 2, .gap_m = -1e-6};
+  moment.record.contacts[0].point_W_m = {0.4, 0.5, 0.6};
   const std::string bytes = encode_moment(moment, std::vector{X, X}, std::vector{X});
-  ASSERT_EQ(bytes.size(), 8 * (1 + field_names().size()) + 4 * 7 * 3);
+  const std::size_t contacts = 1 + field_names().size(), fields = contact_field_names().size();
+  const std::size_t poses = contacts + 1 + fields;
+  ASSERT_EQ(bytes.size(), 8 * poses + 4 * 7 * 3);
+  EXPECT_EQ(number_at(bytes, contacts), 1.0);
+  EXPECT_EQ(number_at(bytes, contacts + 1), 2.0);
+  EXPECT_EQ(number_at(bytes, contacts + 5), -1e-6);
+  EXPECT_EQ(number_at(bytes, contacts + 7), 0.5);
   EXPECT_EQ(number_at(bytes, 0), kind_moment);
   EXPECT_EQ(number_at(bytes, 1 + place_of("time_s")), 2.5);
   EXPECT_EQ(number_at(bytes, 1 + place_of("proxy_y")), 0.2);
@@ -42,7 +51,7 @@ TEST(Moment, IsOnTheWireWhereItsNamesSay) {
   EXPECT_EQ(number_at(bytes, 1 + place_of("inertia_kg_m2")), 0.03);
   EXPECT_EQ(number_at(bytes, 1 + place_of("contact_torque_z")), -0.5);
   std::array<float, 7> pose{};
-  std::memcpy(pose.data(), bytes.data() + 8 * (1 + field_names().size()), sizeof pose);
+  std::memcpy(pose.data(), bytes.data() + 8 * poses, sizeof pose);
   EXPECT_EQ(pose, (std::array<float, 7>{1, 2, 3, 0, 0, 0, 1}));
 }
 
