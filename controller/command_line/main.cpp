@@ -301,8 +301,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                                          [&](controller::SignalsForm form) { options.signals = form; }),
          "how the record keeps its rows: packed (the default: a quarter of the size, frames.log with them), binary "
          "(signals.bin: numbers in columns, which load in no time) or csv (signals.csv); `proxarm signals` makes text "
-         "of "
-         "all")
+         "of all")
       ->type_name("packed|binary|csv")
       ->needs(record);
   app.add_option("--set", options.changes,

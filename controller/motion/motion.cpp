@@ -15,8 +15,8 @@ void record_world(const WorldStep& step, CycleRecord& record) noexcept {
   record.proxy_damping_Ns_per_m = step.damping_Ns_per_m;
   record.set(RecordFlag::unresolved, step.unresolved);
   record.contact_count = static_cast<std::uint8_t>(step.contacts);
-  static_assert(std::tuple_size_v<decltype(step.touches)> == most_contacts);
-  for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
+  static_assert(std::tuple_size_v<Touches> == most_contacts);
+  for (std::size_t i = 0; i < step.touches.size(); ++i) {
     const models::PoseContact& touch = step.touches[i];
     record.contacts[i] = {.object = touch.object,
                           .part = touch.part,

@@ -173,19 +173,19 @@ void PoseWorld::report(const ToolPose& p_hat, const ToolPose& limited) noexcept 
 
 // Keeps the strongest, the strongest first; what touches without a force doesn't count.
 void PoseWorld::report_contacts() noexcept {
-  auto& touches = last_.touches;
-  auto end = touches.begin();
+  auto end = touches_.begin();
   for (const models::PoseContact& contact : g_->contacts()) {
     const double force_N = contact.force_W.norm();
     if (!(force_N > 0.0)) continue;
     ++last_.contacts;
     last_.slips = last_.slips || contact.slips;
-    const auto place = std::find_if(touches.begin(), end, [&](const auto& t) { return t.force_W.norm() < force_N; });
-    if (place == touches.end()) continue;
-    if (end != touches.end()) ++end;
+    const auto place = std::find_if(touches_.begin(), end, [&](const auto& t) { return t.force_W.norm() < force_N; });
+    if (place == touches_.end()) continue;
+    if (end != touches_.end()) ++end;
     std::move_backward(place, end - 1, end);
     *place = contact;
   }
+  last_.touches = {touches_.begin(), end};
 }
 
 void PoseWorld::set(const Change& change) noexcept {

@@ -91,7 +91,8 @@ class PoseWorld final : public RenderedWorld {
   models::FreeSpace<3> no_world_;
   LimitedAlgorithm<3> limits_;
   PoseProxy proxy_;
-  WorldStep last_;
+  Touches touches_;
+  WorldStep last_;                               // its touches are among these
   models::Twist walls_ = models::Twist::Zero();  // what the limits of rotation exerted in the last step, beside p̂
   models::Vec3 torque_W_ = models::Vec3::Zero(), omega_W_ = models::Vec3::Zero();
   Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();  // for start() and resume()

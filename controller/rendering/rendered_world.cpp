@@ -206,8 +206,10 @@ class WorldOfDimension final : public RenderedWorld {
     last_.v_W = space_.basis() * proxy_.velocity();
     last_.mass_kg = proxy_.config().mass_kg;
     last_.damping_Ns_per_m = proxy_.config().damping_Ns_per_m;
-    add_contacts<N>(last_, scene_->algorithm<N>().contacts(), space_.basis());
-    for (models::PoseContact& touch : recorded_touches(last_)) touch.friction = changes_.friction(touch.object);
+    add_contacts<N>(last_, touches_, scene_->algorithm<N>().contacts(), space_.basis());
+    for (std::size_t i = 0; i < last_.touches.size(); ++i) {
+      touches_[i].friction = changes_.friction(touches_[i].object);
+    }
   }
 
   void set_spring(double spring_N_per_m) noexcept {
@@ -224,7 +226,8 @@ class WorldOfDimension final : public RenderedWorld {
   AdmittanceProxy<N> proxy_;
   std::unique_ptr<Lookahead<N>> ahead_;  // null: without lookahead
   SpringAnchor<N> anchor_;
-  WorldStep last_;
+  Touches touches_;
+  WorldStep last_;  // its touches are among these
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0;
   bool started_ = false;
   bool unsettled_ = false;  // the proxy may be where the scene doesn't allow it

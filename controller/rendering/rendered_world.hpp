@@ -24,6 +24,9 @@
 
 namespace proxarm::controller {
 
+// So many contacts of a step are told one by one.
+using Touches = std::array<models::PoseContact, 8>;
+
 // The result of one step of the proxy; all in W.
 struct WorldStep {
   models::Vec3 q_W = models::Vec3::Zero();       // the new proxy
@@ -31,8 +34,9 @@ struct WorldStep {
   models::Vec3 f_W = models::Vec3::Zero();       // the world's force on the proxy, (25a)
   models::Vec3 torque_W = models::Vec3::Zero();  // about q; of a rigid tool
   models::Vec3 v_W = models::Vec3::Zero();
-  int contacts = 0;                            // how many press
-  std::array<models::PoseContact, 8> touches;  // the first of them; of a point without place and force
+  int contacts = 0;  // how many press
+  // Those of them that are told; of a point without place and force. The world's own: they last until its next step.
+  std::span<const models::PoseContact> touches;
   bool slips = false;
   bool unresolved = false;                             // of a rigid tool (pose_algorithm.hpp)
   ActiveLimits limits;                                 // that held the proxy back
@@ -44,14 +48,15 @@ struct WorldStep {
   ProxyFault fault = ProxyFault::none;
 };
 
-// Adds the contacts of a step, with their normals turned to W by the scene's basis.
+// Tells the contacts of a step in `touches`, with their normals turned to W by the scene's basis. Precondition: `step`
+// has none yet, and `touches` outlives it.
 template <int N>
-void add_contacts(WorldStep& step, std::span<const models::Contact<N>> contacts,
+void add_contacts(WorldStep& step, Touches& touches, std::span<const models::Contact<N>> contacts,
                   const Eigen::Matrix<double, 3, N>& basis) noexcept {
   for (const models::Contact<N>& contact : contacts) {
     const auto place = static_cast<std::size_t>(step.contacts++);
-    if (place < step.touches.size()) {
-      models::PoseContact& touch = step.touches[place];
+    if (place < touches.size()) {
+      models::PoseContact& touch = touches[place];
       touch.object = contact.object;
       touch.part = -1;
       touch.slips = contact.slips;
@@ -59,11 +64,7 @@ void add_contacts(WorldStep& step, std::span<const models::Contact<N>> contacts,
     }
     step.slips = step.slips || contact.slips;
   }
-}
-
-// Those of a step that are recorded.
-inline std::span<models::PoseContact> recorded_touches(WorldStep& step) noexcept {
-  return {step.touches.data(), std::min<std::size_t>(static_cast<std::size_t>(step.contacts), step.touches.size())};
+  step.touches = {touches.data(), std::min(contacts.size(), touches.size())};
 }
 
 class RenderedWorld {

@@ -86,7 +86,7 @@ class TorquesOfDimension final : public TorqueRendering {
     world.p_hat_W = space_.to_W(proxy_.p_hat());
     world.limit_force_W = space_.basis() * (e * proxy_.kappa_N_per_m() * limited_.limit_shift());
     world.f_W = f_W - world.limit_force_W;
-    add_contacts<N>(world, scene_->algorithm<N>().contacts(), space_.basis());
+    add_contacts<N>(world, touches_, scene_->algorithm<N>().contacts(), space_.basis());
     if constexpr (N < 3) {
       const Vec3 held = spring_to(space_.start_W(), p_W);
       f_W += held - space_.basis() * (space_.basis().transpose() * held);
@@ -148,6 +148,7 @@ class TorquesOfDimension final : public TorqueRendering {
   StepLimits walls_;
   models::ToolKinematics tool_;
   Vec3 p_k1_W_ = Vec3::Zero();
+  Touches touches_;
   TorqueStep last_;
 };
 

@@ -7,9 +7,10 @@
 //   contacts.csv     a row for each contact of each cycle (signals/contact_columns.hpp), or contacts.bin in its place;
 //                    contact_columns.json has what they mean
 //   session.mcap     the same session for other tools (messages/mcap_writer.hpp)
-//   frames.log       (packed: frames.log.zst) every frame on every bus, as `candump -L` writes them, so canplayer and
-//   log2asc read it effective.yaml   what the session ran with, every default filled in (and other configuration files
-//   by their names) summary.json     figures that are the same in two runs with the same input (repeatable_json())
+//   frames.log       every frame on every bus, as `candump -L` writes them, so canplayer and log2asc read it; packed it
+//                    is frames.log.zst
+//   effective.yaml   what the session ran with, every default filled in (and other configuration files by their names)
+//   summary.json     figures that are the same in two runs with the same input (repeatable_json())
 //   replay           what `proxarm replay` needs (replay_log.hpp)
 //   timing.json      those of the wall clock (timing_json()); overruns and compute time stand nowhere else
 //

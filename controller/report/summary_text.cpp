@@ -325,7 +325,7 @@ void tell_time(const Summary& s, Lines& line) {
 }
 
 // Up to which frequency the mass is what it should be, and what it is where that is worst.
-// Of the directions in which the tool was moved, the worst first: where an arm feels right along x only, it doesn't.
+// Up to which frequency the mass is right along each axis that the tool was moved along, the worst axis first.
 std::string felt_along(const Summary& s) {
   const auto& [name, limit] = felt_limits[1];
   std::vector<std::pair<double, const char*>> along;

@@ -33,8 +33,8 @@ constexpr std::size_t rows_of_block = SignalTableWriter::apart;
 static_assert(rows_of_block == page_bytes / sizeof(double));
 constexpr std::size_t rows_at_once = 64;  // written; as many as signals.csv's buffer holds
 constexpr std::size_t json_begins_at = 24;
-constexpr std::size_t most_block_rows = 1
-                                        << 16;  // far above what is written: bounds what a damaged head makes of memory
+// Far above what is written: bounds what a damaged head makes of memory.
+constexpr std::size_t most_block_rows = 1 << 16;
 constexpr std::array<std::pair<Form, const char*>, 5> forms{{{Form::number, "number"},
                                                              {Form::integer, "integer"},
                                                              {Form::seconds, "seconds"},

@@ -180,7 +180,8 @@ class NewCell {
     cell_.sensor.pose_link.rpy_rad = {rounded(ypr[2]), rounded(ypr[1]), rounded(ypr[0])};
   }
 
-  // How heavy the arm has to feel there, by the model of the loop; infinite: no mass is stable, or it can't begin.
+  // The smallest mass that is stable with margins from this start; infinite: none is, or the arm can't begin there.
+  // Leaves the files and remarks of this start.
   double least_kg(const StartPose& start, const models::Arm& arm, const models::ToolSpace& space,
                   const description::HandDescription& hand) {
     constexpr double never = std::numeric_limits<double>::infinity();
@@ -196,15 +197,14 @@ class NewCell {
     }
   }
 
-  // Of starts that look alike, what a hand notices is the mass: the lightest come first, by steps of a fifth.
+  // Sorts the starts by the mass that they ask for. Masses within a fifth count as equal: there the better pose stays
+  // first.
   void sort_by_mass(std::vector<StartPose>& starts, const models::Arm& arm, const models::ToolSpace& space,
                     const description::HandDescription& hand) {
     constexpr double step = 1.2;
     std::vector<std::pair<double, StartPose>> judged;
-    const std::vector<std::string> remarks = source_.remarks;
     for (const StartPose& start : starts) {
       judged.emplace_back(std::floor(std::log(least_kg(start, arm, space, hand)) / std::log(step)), start);
-      source_.remarks = remarks;
     }
     std::stable_sort(judged.begin(), judged.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     for (std::size_t k = 0; k < starts.size(); ++k) starts[k] = judged[k].second;

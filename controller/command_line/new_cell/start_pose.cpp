@@ -50,7 +50,7 @@ double reach_of(const models::Arm& arm) {
   return reach_m > 0.0 ? reach_m : 1.0;
 }
 
-// A joint that can be turned by more than once does so for nothing.
+// Takes full turns off joints whose ranges allow more than one.
 void turn_within_once(const models::Arm& arm, JointVector& q) {
   constexpr double once = 2.0 * std::numbers::pi;
   for (int i = 0; i < arm.axes(); ++i) {
@@ -60,8 +60,8 @@ void turn_within_once(const models::Arm& arm, JointVector& q) {
   }
 }
 
-// An arm on an upright first joint is the same in whatever direction that has turned it: straight ahead is what people
-// take. Where the joint's range doesn't let it, it stays.
+// Turns an upright first joint so that the tool is straight ahead, where people take hold of an arm. A pose for which
+// the joint's range is too narrow stays as it is.
 void turn_ahead(const models::Arm& arm, JointVector& q) {
   constexpr double upright = 0.999;
   const auto first = static_cast<Eigen::Index>(arm.drive_along_chain(0));
@@ -78,8 +78,8 @@ void turn_ahead(const models::Arm& arm, JointVector& q) {
   }
 }
 
-// How well the tool's place can be moved, as a share of what is well, and how far a wrist is from its own singularity:
-// the sine of its middle angle, of which a half is well. The smaller of the two, at most 1.
+// From 0 to 1: the smaller one of two shares. The first is that of σ of the place (place_margin.hpp) by a quarter of
+// the reach; the second, of a wrist, that of the sine of its middle angle by a half.
 double dexterity(const models::Arm& arm, const controller::PlaceMargin& places, const JointVector& q, double reach_m) {
   constexpr double well_share = 0.25, well_sine = 0.5;
   models::ToolKinematics at;
@@ -185,10 +185,11 @@ std::vector<StartPose> find_starts(const models::Arm& arm, const description::Ha
     return std::all_of(found.begin(), found.end(),
                        [&](const StartPose& start) { return (start.q - q).cwiseAbs().maxCoeff() > another_rad; });
   };
-  const std::array sorted{sorted_poses(arm, reach_m, true), sorted_poses(arm, reach_m, false)};
+  std::array<std::vector<JointVector>, 2> sorted;  // straight ahead, and anywhere: made when they are first needed
   for (const double share : {1.0, 0.5, 0.25, 0.1}) {
     const description::HandDescription shorter = with_shorter_way(hand, share);
-    for (const std::vector<JointVector>& starts : sorted) {
+    for (std::vector<JointVector>& starts : sorted) {
+      if (starts.empty()) starts = sorted_poses(arm, reach_m, &starts == &sorted[0]);
       for (const JointVector& q : starts) {
         if (found.size() == most) break;
         if (is_another(q) && can_be_gone(arm, inverse, q, shorter, step_m)) found.push_back({q, share});
