@@ -210,6 +210,7 @@ void FaultMonitor::judge_jump(const JudgedCycle& cycle) noexcept {
   if (!cycle.load_S || !follows) return jump_.start();
   const LoadSample sample{.load_S = *cycle.load_S,
                           .hand_S = measured.R_WS.transpose() * measured.hand_W.force,
+                          .beside_zero_S = measured.bias.beside_zero_S,
                           .noise_N = measured.bias.noise_N,
                           .since_s = since_s,
                           .usual_s = measured.bias.sample_cycles * settings_.period_s};

@@ -15,6 +15,8 @@ constexpr double noise_deviations = 8.0, tare_deviations = 4.0;
 constexpr double calm_way_m = 0.02, shortest_calm_s = 0.06;
 constexpr double quiet_way_m = 0.04, shortest_quiet_s = 0.5;
 constexpr double longest_s = 1.5;
+// How far what the tare doesn't know of the bias may lead a mass from rest.
+constexpr double unknown_way_m = 1e-3;
 constexpr double leaving = 1.5;
 // After an acceleration of the arm the handle may oscillate for two periods of its first mode (15 Hz).
 constexpr double ringing_s = 0.1;
@@ -53,6 +55,12 @@ void EmptyHandle::follow() noexcept {
   s.bias_W += std::min(1.0, most_N) * behind_W;
 }
 
+// A sensor whose noise is large has a tare that isn't known well, and what isn't known of it leads the mass.
+double EmptyHandle::longest_empty_s(const HandSigns& signs, double unknown_N) noexcept {
+  if (!(signs.mass_kg > 0.0 && unknown_N > 0.0)) return longest_s;
+  return std::clamp(std::sqrt(2.0 * unknown_way_m * signs.mass_kg / unknown_N), shortest_quiet_s, longest_s);
+}
+
 bool EmptyHandle::step(const HandSigns& signs) noexcept {
   const double T = period_s_, share = T / (T + filter_s);
   State& s = state_;
@@ -69,7 +77,8 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
   // Somebody moved the handle during the tare, or the sensor filters its samples. How much of σ is noise isn't known
   // then.
   if (!signs.noise_is_white) noise_band = std::min(noise_band, config_.band_N);
-  const double band = std::max(config_.band_N, noise_band);
+  const double band = std::max(config_.band_N, noise_band) + signs.unknown_N;
+  noise_band += signs.unknown_N;
   follow();
   const double size = size_N(s.wrench_W);
   s.calm_s = size <= noise_band ? s.calm_s + T : 0.0;
@@ -86,11 +95,13 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
     }
   } else {
     if (signs.at_handle) way_.start();
-    s.led = way_.step({signs.hand_W.force, signs.v_W, signs.mass_kg, signs.noise_N, T, signs.left_by_tare});
+    s.led = way_.step({signs.hand_W.force, signs.v_W, signs.mass_kg, signs.noise_N, T, signs.left_by_tare,
+                       signs.as_offset, signs.limited});
     if (s.led) s.bias_W = way_.line_W();
     const double ways = config_.way_share / speed;
-    s.empty = s.led || s.calm_s >= std::clamp(calm_way_m * ways, shortest_calm_s, longest_s) ||
-              s.quiet_s >= std::clamp(quiet_way_m * ways, shortest_quiet_s, longest_s);
+    const double longest = longest_empty_s(signs, tare_deviations * sigma_mean);
+    s.empty = s.led || s.calm_s >= std::clamp(calm_way_m * ways, shortest_calm_s, longest) ||
+              s.quiet_s >= std::clamp(quiet_way_m * ways, shortest_quiet_s, longest);
   }
   s.braking_m_per_s2 = s.empty ? std::min(braking_m_per_s2, s.braking_m_per_s2 + braking_rise_m_per_s3 * T) : 0.0;
   s.rest_s = s.empty && speed <= rest_m_per_s ? s.rest_s + T : 0.0;

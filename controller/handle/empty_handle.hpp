@@ -50,6 +50,9 @@ struct HandSigns {
   double mass_kg = 0.0;          // of the proxy
   bool at_handle = false;        // the force acts at the handle
   bool left_by_tare = false;     // it is what a hand left in the tare
+  bool as_offset = false;        // it acts at the sensor's origin
+  double unknown_N = 0.0;        // of it, what may be a weight that isn't the tool's in the cell
+  bool limited = false;          // a limit held the proxy back in its last step
 };
 
 class EmptyHandle {
@@ -100,6 +103,7 @@ class EmptyHandle {
 
   [[nodiscard]] double size_N(const models::Wrench& wrench_W) const noexcept;
   void follow() noexcept;
+  [[nodiscard]] static double longest_empty_s(const HandSigns& signs, double unknown_N) noexcept;
 
   EmptyHandleConfig config_;
   double period_s_;

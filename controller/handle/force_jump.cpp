@@ -12,37 +12,79 @@ namespace {
 using models::Vec3;
 using models::Wrench;
 
-constexpr double noises = 8.0;  // of a difference of samples: once in 1e15
+// Of a sample less the two or so before it, whose variance is some 2.3 σ²: once in 1e7 axes and samples, and none
+// stays.
+constexpr double noises = 8.0;
 constexpr double least_noises = 20.0;
+// A force that shakes from sample to sample is expected now and then: it is calm once it was for some ten samples.
+constexpr double trend_share = 0.25, calm_kept = 0.8;
 constexpr double flipped_share = 0.02, least_flip_N = 1.0, least_turn_N = 10.0;
+// A hand's force that turns to its opposite and then grows by this factor, within a cone of 17 degrees.
+constexpr double grown = 2.5, beside_share = 0.3, grows_within_s = 1.0;
 // What stays within this share of the step for so long is one. A blow of steel is over within a few milliseconds.
 constexpr double kept_share = 0.2, kept_s = 0.005, back_s = 0.05;
 // A sample that is later than this many of the usual times isn't the next one.
 constexpr double late = 1.5;
 
+Vec3 turned_about_zero(const Vec3& sign, const Vec3& load, const Vec3& zero) {
+  return sign.cwiseProduct(load + zero) - zero;
+}
+
 }  // namespace
 
-// Whether the load is the one before with its sign, or the sign of two axes, turned. A force that swings through zero
-// is its own opposite from one sample to the next, too, but it has come on the way there.
-bool ForceJump::flipped(const LoadSample& sample) noexcept {
+// Whether the sample is this load, to 2 % of the step and the noise.
+bool ForceJump::is_turned(const LoadSample& sample, const Wrench& turned_S, double step_N,
+                          double step_Nm) const noexcept {
+  const double off_N = (sample.load_S.force - turned_S.force).norm();
+  const double off_Nm = (sample.load_S.torque - turned_S.torque).norm();
+  const double zero_Nm = 2.0 * config_.handle_S.norm() * sample.beside_zero_S.norm();
+  return off_N <= flipped_share * step_N + noises * sample.noise_N &&
+         off_Nm <= flipped_share * step_Nm + noises * noise_lever_m * sample.noise_N + zero_Nm;
+}
+
+// Whether the load is the expected one with its sign, or the sign of two axes, turned. A force that swings through zero
+// is its own opposite from one sample to the next, too, but it was expected to.
+bool ForceJump::flipped(const LoadSample& sample, const Wrench& expected_S, double off_N) noexcept {
   State& s = state_;
-  if (s.samples < 2.0) return false;
+  const double noise_N = least_noises * sample.noise_N;
+  if (s.samples < 2.0 || off_N < 0.5 * std::max(least_flip_N, noise_N) || s.calm_N > kept_share * off_N) return false;
+  const Vec3 weight_S = sample.load_S.force - sample.hand_S;
   const std::array<Vec3, 4> signs{Vec3(-1, -1, -1), Vec3(-1, -1, 1), Vec3(-1, 1, -1), Vec3(1, -1, -1)};
   for (const Vec3& sign : signs) {
-    const Wrench turned{sign.cwiseProduct(s.last_S.force), sign.cwiseProduct(s.last_S.torque)};
-    const double step_N = (turned.force - s.last_S.force).norm(), step_Nm = (turned.torque - s.last_S.torque).norm();
-    const bool all = sign.sum() < -2.0;
-    const double least_N = std::max(all ? least_flip_N : least_turn_N, least_noises * sample.noise_N);
-    if (step_N < least_N || s.calm_N > kept_share * step_N) continue;
-    const double off_N = (sample.load_S.force - turned.force).norm();
-    const double off_Nm = (sample.load_S.torque - turned.torque).norm();
-    if (!(off_N <= flipped_share * step_N + noises * sample.noise_N)) continue;
-    if (!(off_Nm <= flipped_share * step_Nm + noises * noise_lever_m * sample.noise_N)) continue;
-    s.step_N = step_N;
-    s.limit_N = least_N;
-    return true;
+    for (const Vec3& zero_S : {Vec3(Vec3::Zero()), sample.beside_zero_S}) {
+      const Wrench turned{turned_about_zero(sign, expected_S.force, zero_S), sign.cwiseProduct(expected_S.torque)};
+      const double step_N = (turned.force - expected_S.force).norm();
+      const double step_Nm = (turned.torque - expected_S.torque).norm();
+      if (step_N < std::max(least_flip_N, noise_N) || s.calm_N > kept_share * step_N) continue;
+      if (!is_turned(sample, turned, step_N, step_Nm)) continue;
+      const double of_weight_N = (sign.cwiseProduct(weight_S) - weight_S).norm();
+      const double least_N = of_weight_N >= least_flip_N || sign.sum() < -2.0 ? least_flip_N : least_turn_N;
+      s.step_N = step_N;
+      s.limit_N = std::max(least_N, noise_N);
+      if (step_N >= s.limit_N) return true;
+      s.turned_S = sample.hand_S;
+      s.turned_s = 0.0;
+      return false;
+    }
   }
   return false;
+}
+
+// Whether a hand's force that turned grows on its line.
+bool ForceJump::grows(const LoadSample& sample) noexcept {
+  State& s = state_;
+  if (s.turned_s < 0.0) return false;
+  s.turned_s += sample.since_s;
+  const double turned_N = s.turned_S.norm(), along_N = sample.hand_S.dot(s.turned_S) / turned_N;
+  const double jumped_N = (sample.load_S.force - s.last_S.force).norm();
+  const bool goes_on = s.turned_s <= grows_within_s && along_N >= 0.5 * turned_N &&
+                       jumped_N <= kept_share * along_N + noises * sample.noise_N;
+  if (!goes_on) s.turned_s = -1.0;
+  const bool beside = (sample.hand_S - along_N / turned_N * s.turned_S).norm() > beside_share * along_N;
+  if (!goes_on || beside || along_N < grown * turned_N) return false;
+  s.step_N = 2.0 * turned_N;
+  s.limit_N = std::max(least_flip_N, least_noises * sample.noise_N);
+  return true;
 }
 
 // Whether little force is left, or what was there before the last step.
@@ -52,22 +94,24 @@ bool ForceJump::releases(const LoadSample& sample, double near_N) const noexcept
 }
 
 // Whether this sample's step is one to watch.
-void ForceJump::watch(const LoadSample& sample, double step_N) noexcept {
+void ForceJump::watch(const LoadSample& sample, const Wrench& expected_S, double off_N) noexcept {
   State& s = state_;
   const double usual_ms = 1e3 * std::max(sample.usual_s, sample.since_s);
   const double most_N = config_.max_step_N * std::max(1.0, usual_ms) + noises * sample.noise_N;
   const double least_N = std::max(config_.least_N, least_noises * sample.noise_N);
-  const Vec3 force = sample.load_S.force - s.last_S.force;
-  const Wrench step{force, sample.load_S.torque - s.last_S.torque - config_.handle_S.cross(force)};
-  const double beside_Nm = beside_handle_m * step_N + noises * noise_lever_m * sample.noise_N;
-  const bool calm = s.samples >= 2.0 && s.calm_N <= kept_share * step_N;
-  const bool offset = step_N >= least_N && calm && step.torque.norm() > beside_Nm;
-  if (!std::isfinite(step_N) || (step_N < most_N && !offset)) return;
-  if (releases(sample, kept_share * step_N + noises * sample.noise_N)) return;
+  const double step_N = (sample.load_S.force - s.last_S.force).norm();
+  const Vec3 off = sample.load_S.force - expected_S.force;
+  const Vec3 off_torque = sample.load_S.torque - expected_S.torque - config_.handle_S.cross(off);
+  const double beside_Nm = beside_handle_m * off_N + noises * noise_lever_m * sample.noise_N;
+  const bool calm = s.samples >= 2.0 && s.calm_N <= kept_share * off_N;
+  const bool offset = off_N >= least_N && calm && off_torque.norm() > beside_Nm;
+  if (!std::isfinite(off_N) || (step_N < most_N && !offset)) return;
+  if (releases(sample, kept_share * off_N + noises * sample.noise_N)) return;
   s.before_S = s.last_S.force;
   s.before_s = 0.0;
-  s.stepped_S = sample.load_S;
-  s.step_N = step_N;
+  s.stepped_S = sample.load_S.force;
+  s.stepped_trend_S = calm ? s.trend_S.force : Vec3(Vec3::Zero());
+  s.step_N = off_N;
   s.limit_N = step_N >= most_N ? most_N : least_N;
   s.watched_s = 0.0;
 }
@@ -76,7 +120,8 @@ bool ForceJump::stayed(const LoadSample& sample) noexcept {
   State& s = state_;
   if (s.watched_s < 0.0) return false;
   s.watched_s += sample.since_s;
-  const double changed_N = (sample.load_S.force - s.stepped_S.force).norm();
+  s.stepped_S += s.stepped_trend_S;
+  const double changed_N = (sample.load_S.force - s.stepped_S).norm();
   if (!(changed_N <= kept_share * s.step_N + noises * sample.noise_N)) {
     s.watched_s = -1.0;
     return false;
@@ -88,14 +133,17 @@ bool ForceJump::step(const LoadSample& sample) noexcept {
   State& s = state_;
   if (!(sample.since_s <= late * sample.usual_s)) s.samples = 0.0;
   if (s.samples == 0.0) {
-    s = {.last_S = sample.load_S, .stepped_S = {}, .samples = 1.0};
+    s = {.last_S = sample.load_S, .trend_S = {}, .samples = 1.0};
     return false;
   }
-  const double step_N = (sample.load_S.force - s.last_S.force).norm();
+  const Wrench expected_S{s.last_S.force + s.trend_S.force, s.last_S.torque + s.trend_S.torque};
+  const double off_N = (sample.load_S.force - expected_S.force).norm();
   s.before_s += sample.since_s;
-  const bool found = flipped(sample) || stayed(sample);
-  if (!found) watch(sample, step_N);
-  s.calm_N = step_N;
+  const bool found = grows(sample) || flipped(sample, expected_S, off_N) || stayed(sample);
+  if (!found) watch(sample, expected_S, off_N);
+  s.trend_S.force += trend_share * (sample.load_S.force - expected_S.force);
+  s.trend_S.torque += trend_share * (sample.load_S.torque - expected_S.torque);
+  s.calm_N = std::max(off_N, calm_kept * s.calm_N);
   s.samples = 2.0;
   s.last_S = sample.load_S;
   return found;

@@ -36,8 +36,10 @@ void HandForce::step(const Wrench& reading_W, const Mat3& R_WS, const Vec3& v_W,
   const double large_N = std::max(least_N, least_noises * calm_noise_N);
   s.left_by_tare = s.calm_W.force.norm() >= least_left * large_N &&
                    (s.calm_W.force + R_WS * beside_zero_S).norm() <= left_share * beside_zero_S.norm();
-  s.at_handle = !s.left_by_tare && s.calm_W.force.norm() >= large_N &&
-                acts_at_handle(s.calm_W, R_WS * tool_.handle_S, calm_noise_N);
+  const bool large = !s.left_by_tare && s.calm_W.force.norm() >= large_N;
+  const Vec3 handle_W = R_WS * tool_.handle_S;
+  s.at_handle = large && acts_at_handle(s.calm_W, handle_W, calm_noise_N);
+  s.as_offset = large && !s.at_handle && acts_as_offset(s.calm_W, handle_W, calm_noise_N);
 }
 
 }  // namespace proxarm::controller

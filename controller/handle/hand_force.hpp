@@ -14,6 +14,8 @@
 // force acts at the handle if its torque is at most a third of that, too. It can be told where |p × F| is three times
 // what isn't known of τ.
 //
+// It acts as an offset if its line passes the sensor's origin, as well as that can be told.
+//
 // A hand that pushed while the sensor was tared, and was taken for its zero, leaves the opposite of its force when it
 // lets go, and that acts at the handle as it did. So a force that is what the tare differs from the known zero by is
 // none that can be told.
@@ -54,6 +56,14 @@ inline bool acts_at_handle(const models::Wrench& wrench, const models::Vec3& han
   return wrench.torque.norm() <= std::min(beside_handle_m * force_N, offset_Nm / telling) + noise_Nm;
 }
 
+// Whether a wrench about T's origin acts at the sensor's origin, as its offset does.
+inline bool acts_as_offset(const models::Wrench& wrench, const models::Vec3& handle, double noise_N) noexcept {
+  constexpr double deviations = 4.0, telling = 3.0;
+  const double known_Nm = std::max(known_line_m * wrench.force.norm(), deviations * noise_lever_m * noise_N);
+  const models::Vec3 offset = handle.cross(wrench.force);
+  return offset.norm() >= telling * known_Nm && (wrench.torque + offset).norm() <= known_Nm;
+}
+
 class HandForce {
  public:
   // `lag_s`: from the proxy to the steel.
@@ -76,6 +86,8 @@ class HandForce {
   [[nodiscard]] const models::Wrench& wrench_W() const noexcept { return state_.wrench_W; }
   // What moves it acts at the handle, as a load or a hand does, and is large enough to tell.
   [[nodiscard]] bool at_handle() const noexcept { return state_.at_handle; }
+  // What moves it acts at the sensor's origin, and is large enough to tell.
+  [[nodiscard]] bool as_offset() const noexcept { return state_.as_offset; }
   // It is what a hand that is gone left in the tare.
   [[nodiscard]] bool left_by_tare() const noexcept { return state_.left_by_tare; }
   [[nodiscard]] double tool_mass_kg() const noexcept { return tool_.mass_kg; }
@@ -87,7 +99,7 @@ class HandForce {
     models::Wrench wrench_W, calm_W;  // calm_W: behind a low-pass
     models::Vec3 v_k1_W = models::Vec3::Zero();
     models::Vec3 a1_W = models::Vec3::Zero(), a2_W = models::Vec3::Zero(), a3_W = models::Vec3::Zero();
-    bool at_handle = false, left_by_tare = false;
+    bool at_handle = false, as_offset = false, left_by_tare = false;
   };
 
   HeldTool tool_;

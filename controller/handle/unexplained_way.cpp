@@ -23,9 +23,10 @@ constexpr double small_N = 1.5, same_share = 0.2, accelerated_share = 0.5, long_
 }  // namespace
 
 void UnexplainedWay::add(const LedHandle& now) noexcept {
-  if (state_.fit.n == 0.0) state_ = {.fit = {}, .way_W = Vec3::Zero(), .first_v_W = now.v_W};
+  if (state_.fit.n == 0.0) state_ = {.fit = {}, .way_W = Vec3::Zero(), .first_v_W = now.v_W, .free_s = 0.0};
   state_.fit.add(now.force_W, now.period_s);
   state_.way_W += now.period_s * now.v_W;
+  if (!now.limited) state_.free_s += now.period_s;
 }
 
 bool UnexplainedWay::leads(const LedHandle& now, const FittedLine& line) const noexcept {
@@ -33,9 +34,9 @@ bool UnexplainedWay::leads(const LedHandle& now, const FittedLine& line) const n
   const Vec3 mean_W = s.fit.first_W + s.fit.h / s.fit.n;
   const double mean_N = mean_W.norm(), lasted_s = s.fit.n * now.period_s;
   if (!(line.end_W.dot(now.v_W) > 0.0) || !(now.mass_kg > 0.0)) return false;
-  if (now.left_by_tare) return true;
+  if (now.left_by_tare || now.as_offset) return true;
   const double gained = now.mass_kg * (now.v_W - s.first_v_W).dot(mean_W) / mean_N;
-  const bool accelerates = gained >= accelerated_share * mean_N * lasted_s;
+  const bool accelerates = gained >= accelerated_share * mean_N * s.free_s;
   const double now_N = line.end_W.norm();
   const bool from_rest = s.first_v_W.norm() <= rest_m_per_s + std::min(mean_N, now_N) / now.mass_kg * seen_s;
   if (from_rest && now_N < small_N) return true;

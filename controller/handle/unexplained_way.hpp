@@ -38,6 +38,8 @@ struct LedHandle {
   double noise_N = 0.0;  // σ
   double period_s = 0.0;
   bool left_by_tare = false;
+  bool as_offset = false;  // it acts at the sensor's origin (hand_force.hpp)
+  bool limited = false;    // a limit held the proxy back in its last step
 };
 
 class UnexplainedWay {
@@ -54,6 +56,7 @@ class UnexplainedWay {
     LineFit fit;
     models::Vec3 way_W = models::Vec3::Zero();      // moved since the line began
     models::Vec3 first_v_W = models::Vec3::Zero();  // the velocity when the line began
+    double free_s = 0.0;                            // since then, but for the cycles in which a limit acted
   };
   void add(const LedHandle& now) noexcept;
   [[nodiscard]] bool leads(const LedHandle& now, const FittedLine& line) const noexcept;

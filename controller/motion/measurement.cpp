@@ -12,6 +12,11 @@ namespace {
 constexpr double bias_s = 0.35, bias_N_per_s = 0.35;
 // A torque's bias counts as the force that makes it at this lever: about a handle's length.
 constexpr double bias_lever_m = 0.1;
+// A jump in the tare, of which the bias takes a part. What is less leads an empty handle by 24 mm at most
+// (hand_force.hpp).
+constexpr double least_tare_jump_N = 0.3;
+// What is kept as the sensor's zero for later may go by this much beside its noise meanwhile.
+constexpr double most_kept_N = 0.3;
 // The tare's mean is known to this many of its standard deviations.
 constexpr double tare_deviations = 4.0;
 // Without noise the tool's pose is left, which is known to half a milliradian: half a kilogram's weight goes by 2 mN.
@@ -116,6 +121,15 @@ bool Measurement::tare(const SessionSettings& settings, double tared_for_s, Alar
     return false;
   }
   if (tared_for_s < settings.tare_s || compensation_.tare_samples() == 0.0) return false;
+  const double jumped_N = compensation_.tare_jump_S().norm();
+  if (jumped_N > least_tare_jump_N) {
+    alarm.raise(Fault::force_jumped, -1, jumped_N, least_tare_jump_N);
+    return false;
+  }
+  if (settings.only_tares && !compensation_.noise_is_white() && spread_N > most_kept_N) {
+    alarm.raise(Fault::force_at_start, -1, spread_N, most_kept_N);
+    return false;
+  }
   finish_tare();
   const Vec3 standing_S = compensation_.bias_S().force - Vec3(settings.zero_S_N.data());
   const double limit_N = standing_limit_N(settings);

@@ -32,6 +32,7 @@ TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const mod
                            const std::vector<description::DriveDescription>& drives,
                            const description::SupervisionDescription& supervision, double tool_mass_kg, double period_s)
     : rendering_(std::move(rendering)),
+      arm_(arm),
       max_speed_rad_per_s_(arm.axes()),
       max_torque_Nm_(arm.axes()),
       period_s_(period_s) {
@@ -74,8 +75,23 @@ std::optional<MissingWeight> TorqueMotion::missing_weight() const noexcept {
   return {};
 }
 
+// The force at the tool whose joint torques come closest to what is missing, (J Jᵀ)⁻¹ J τ_0; less where J is singular.
+double TorqueMotion::missing_force_N(const JointVector& link_rad) noexcept {
+  constexpr double least_lever_m = 0.01;
+  arm_.kinematics(link_rad, kinematics_);
+  models::Mat3 A = least_lever_m * least_lever_m * models::Mat3::Identity();
+  Vec3 b = Vec3::Zero();
+  for (Eigen::Index i = 0; i < state_.missing_Nm.size(); ++i) {
+    const Vec3 lever = kinematics_.J_W.col(i).head<3>();
+    A += lever * lever.transpose();
+    b += state_.missing_Nm[i] * lever;
+  }
+  return A.ldlt().solve(b).norm();
+}
+
 void TorqueMotion::start(const Measured& measured, Beginning /*beginning*/) noexcept {
   rendering_->start(measured.link_rad, state_.missing_Nm);
+  state_.missing_N = missing_force_N(measured.link_rad);
   state_.tool_k1_W = measured.tool_W;
   state_.v_W.setZero();
   state_.braked = false;
@@ -113,7 +129,9 @@ double TorqueMotion::largest_tool_speed(const MotionCycle& cycle) noexcept {
   s.tool_k1_W = measured.tool_W;
   constexpr double unbounded = std::numeric_limits<double>::infinity();
   if (!empty_) return unbounded;
-  const bool empty = empty_->step(hand_signs(measured.hand_W, measured.bias, s.v_W, 0.0, false));
+  HandSigns signs = hand_signs(measured.hand_W, measured.bias, s.v_W, 0.0, false);
+  signs.unknown_N = s.missing_N;
+  const bool empty = empty_->step(signs);
   cycle.record.set(RecordFlag::hands_off, empty);
   const double before_m_per_s = s.braked ? s.braked_m_per_s : s.v_W.norm();
   s.braked = empty;

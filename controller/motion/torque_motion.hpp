@@ -9,7 +9,9 @@
 //
 // A handle that nobody holds (handle/empty_handle.hpp) is braked at 4 m/s², then the joints are held where they are,
 // with `let_go: hold` as with `rest`: the device goes on rendering, since it can't hold otherwise. The sensor's bias
-// leads such a device nowhere, so no force is taken for one.
+// leads such a device nowhere, so no force is taken for one. But a tool whose mass isn't the model's reads as a force
+// once it has turned, and lifts or drags the device as well: by τ_0 as a force at the tool, where it has turned by 60
+// degrees and the tool is all that is wrong. The handle counts as empty below that, too.
 #pragma once
 
 #include <memory>
@@ -25,7 +27,7 @@ namespace proxarm::controller {
 
 class TorqueMotion final : public Motion {
  public:
-  // `tool_mass_kg`: the mass of what hangs behind the sensor.
+  // `tool_mass_kg`: the mass of what hangs behind the sensor. Precondition: the arm outlives this object.
   TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const models::Arm& arm,
                const std::vector<description::DriveDescription>& drives,
                const description::SupervisionDescription& supervision, double tool_mass_kg, double period_s);
@@ -63,14 +65,18 @@ class TorqueMotion final : public Motion {
     models::JointVector missing_Nm;  // τ_0, as the hold has shown it so far
     models::Vec3 proxy_W = models::Vec3::Zero();
     models::Vec3 tool_k1_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();  // v: behind a low-pass
+    double missing_N = 0.0;                                                     // τ_0 as a force at the tool
     double braked_m_per_s = 0.0;  // the tool's bound while nobody holds it
     bool braked = false;
   };
 
   void hold(const Measured& measured, double share) noexcept;
+  [[nodiscard]] double missing_force_N(const models::JointVector& link_rad) noexcept;
   [[nodiscard]] double largest_tool_speed(const MotionCycle& cycle) noexcept;
 
   std::unique_ptr<TorqueRendering> rendering_;
+  const models::Arm& arm_;
+  models::ToolKinematics kinematics_;
   models::JointVector max_speed_rad_per_s_, max_torque_Nm_;
   std::optional<EmptyHandle> empty_;  // none where a handle that is let go coasts
   double period_s_;

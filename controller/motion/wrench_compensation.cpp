@@ -26,6 +26,9 @@ void WrenchCompensation::start_tare() noexcept {
   tare_spread_N_ = 0.0;
   tare_squares_S_.setZero();
   tare_steps_S_.setZero();
+  tare_before_S_.setZero();
+  tare_before_ = 0;
+  tare_largest_N_ = tare_next_N_ = 0.0;
 }
 
 void WrenchCompensation::add_tare_sample(const Wrench& reading_S, const Mat3& R_WS) noexcept {
@@ -33,6 +36,13 @@ void WrenchCompensation::add_tare_sample(const Wrench& reading_S, const Mat3& R_
   const Vec3 force = reading_S.force - weight_S.force;
   if (tare_count_ == 0) tare_first_S_ = tare_last_S_ = force;
   tare_steps_S_ += (force - tare_last_S_).cwiseAbs2();
+  const double step_N = (force - tare_last_S_).norm();
+  tare_next_N_ = std::max(tare_next_N_, std::min(step_N, tare_largest_N_));
+  if (step_N > tare_largest_N_) {
+    tare_largest_N_ = step_N;
+    tare_before_S_ = tare_sum_S_.force;
+    tare_before_ = tare_count_;
+  }
   tare_last_S_ = force;
   tare_squares_S_ += (force - tare_first_S_).cwiseAbs2();
   if (tare_count_ > 0) {
@@ -50,6 +60,14 @@ void WrenchCompensation::finish_tare() noexcept {
   bias_S_.torque = tare_sum_S_.torque / static_cast<double>(tare_count_);
   drift_S_ = {};
   learnt_gravity_S_ = tare_gravity_S_;
+}
+
+Vec3 WrenchCompensation::tare_jump_S() const noexcept {
+  constexpr double kept_share = 0.2;
+  const auto before = static_cast<double>(tare_before_), after = static_cast<double>(tare_count_ - tare_before_);
+  if (before < 1.0 || after < 1.0 || tare_next_N_ > kept_share * tare_largest_N_) return Vec3::Zero();
+  const Vec3 jump_S = (tare_sum_S_.force - tare_before_S_) / after - tare_before_S_ / before;
+  return jump_S.norm() >= (1.0 - kept_share) * tare_largest_N_ ? jump_S : Vec3(Vec3::Zero());
 }
 
 void WrenchCompensation::set_tool(double mass_kg, const Vec3& centre_S) noexcept {

@@ -41,6 +41,9 @@ class WrenchCompensation {
   [[nodiscard]] double step_noise_N() const noexcept;
   // False if successive samples are correlated, as a hand's motion or the sensor's own filter makes them.
   [[nodiscard]] bool noise_is_white() const noexcept;
+  // The largest change from one sample to the next, if it stayed: the means before and after it differ by as much, and
+  // no other change is a fifth of it; else zero. In S.
+  [[nodiscard]] models::Vec3 tare_jump_S() const noexcept;
   [[nodiscard]] double tare_samples() const noexcept { return static_cast<double>(tare_count_); }
   // The tool behind the sensor.
   [[nodiscard]] HeldTool tool() const noexcept { return {mass_kg_, centre_of_mass_S_, handle_S_}; }
@@ -72,8 +75,9 @@ class WrenchCompensation {
 
   void archive(fieldbus::StateArchive& state) noexcept {
     state(bias_S_.force, bias_S_.torque, tare_sum_S_.force, tare_sum_S_.torque, tare_squares_S_, tare_first_S_,
-          tare_last_S_, tare_steps_S_, drift_S_.force, drift_S_.torque, tare_count_, tare_spread_N_, mass_kg_,
-          centre_of_mass_S_, tare_gravity_S_, learnt_gravity_S_);
+          tare_last_S_, tare_steps_S_, tare_before_S_, tare_before_, tare_largest_N_, tare_next_N_, drift_S_.force,
+          drift_S_.torque, tare_count_, tare_spread_N_, mass_kg_, centre_of_mass_S_, tare_gravity_S_,
+          learnt_gravity_S_);
   }
 
  private:
@@ -89,6 +93,10 @@ class WrenchCompensation {
   models::Vec3 tare_first_S_ = models::Vec3::Zero();
   models::Vec3 tare_last_S_ = models::Vec3::Zero();
   models::Vec3 tare_steps_S_ = models::Vec3::Zero();  // Σ(xᵢ₊₁ − xᵢ)²
+  // The largest change from a sample to the next, and the second: the sum and number of the samples before the first.
+  models::Vec3 tare_before_S_ = models::Vec3::Zero();
+  std::int64_t tare_before_ = 0;
+  double tare_largest_N_ = 0.0, tare_next_N_ = 0.0;
   models::Vec3 tare_gravity_S_ = models::Vec3::Zero(), learnt_gravity_S_ = models::Vec3::Zero();  // m/s²
   models::Wrench drift_S_;  // how far the bias has drifted since the tare; bias_S_ includes it
   std::int64_t tare_count_ = 0;

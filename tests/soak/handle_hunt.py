@@ -8,8 +8,8 @@ Judged by the records alone:
   no fault    whatever the hand does: the sensor is fine, and somebody is there
   let go      the tool goes on by at most 0.1 m where the hand lets go of it
   a push      a constant force F from rest, of 0.1 to 2 s and at most 0.25 m and 0.35 m/s, accelerates the proxy by F/M
-              within 2 %, along F: fitted to its way from a tenth of that time on, with the delay as a second unknown,
-              until a limit acts
+              within 2 %, along F: fitted to its way from a tenth of that time on, beside how it coasted before, with the
+              delay as a second unknown, until a limit acts
   nobody      the tool stays within 2 mm for a minute
 Masses that aren't stable with a hand are refused by the program, and counted. Oscillations are told: they aren't judged
 here. Status 1, and the session's files in `--keep DIR`, where it isn't so.
@@ -24,7 +24,7 @@ from hunting import SOURCE, direction, log_uniform
 
 CELLS = ("default", "cobot", "seven", "scara", "gantry", "rail", "linear")
 ALONG = {"linear": (1.0, 0.0, 0.0)}  # where the tool moves on a line alone
-# What is let go at up to 0.45 m/s stops within 0.1 m (docs/supervision.md). A gantry's and a rail's own swing after a
+# What these hands let go stops within 0.1 m: they lead at up to 0.3 m/s. A gantry's and a rail's own swing after a
 # jerk is more than the force below which nobody is there: they coast on until it is gone, which is told.
 CALM = ("default", "cobot", "seven", "scara")
 LET_GO_M, PUSH_SHARE, NOBODY_M = 0.1, 0.02, 2e-3
@@ -127,8 +127,11 @@ def acceleration(record, F, from_s, lasts_s):
     """Of the fit ½ a (t − t0)² to the way along F, while it acts: √way is a straight line."""
     size = math.hypot(*F)
     until_s = min(from_s + lasts_s, limited_s(record))
-    start = next(p for t, p in zip(record.time, record.proxy) if t >= from_s - 0.01)
-    points = [(t, sum((a - b) * f for a, b, f in zip(p, start, F)) / size)
+    # What the tare doesn't know of the sensor's zero has led it before, by less than what `nobody` bounds.
+    (t0, early), (t1, start) = (next((t, p) for t, p in zip(record.time, record.proxy) if t >= from_s - before_s)
+                                for before_s in (0.06, 0.01))
+    coasts = [(b - a) / (t1 - t0) for a, b in zip(early, start)]
+    points = [(t, sum((a - b - v * (t - t1)) * f for a, b, v, f in zip(p, start, coasts, F)) / size)
               for t, p in zip(record.time, record.proxy)
               if from_s + max(0.1 * lasts_s, 0.03) < t < until_s]
     rows = [(t, math.sqrt(2 * x), x) for t, x in points if x > 0.0]
@@ -169,7 +172,7 @@ def session(seed, folder):
     out = {"cell": f"{cell}, {kind}", "wrong": [fault["fault"] for fault in summary["faults"]]}
     oscillation = summary["oscillation"]
     out["oscillates"] = bool(oscillation and oscillation["lasts"])
-    if released_s is not None:
+    if released_s is not None and not out["wrong"]:
         figure = "let go mm" if cell in CALM else "of others mm"
         out[figure] = 1e3 * gone_on(record, released_s)
         if out.get("let go mm", 0.0) > 1e3 * LET_GO_M:

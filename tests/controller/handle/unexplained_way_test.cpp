@@ -89,5 +89,45 @@ TEST_F(UnexplainedWayTest, AnEvenForceThatAMediumBearsMayBeAHand) {
   EXPECT_LT(goes_m(stirs, 4.0, 50.0), 0.0);
 }
 
+// The story: let go at the tool's speed limit, a handle under an offset of 4 N went on for as long as the session.
+TEST_F(UnexplainedWayTest, AForceThatALimitHoldsBackIsNoHandAfterASecond) {
+  for (const bool limited : {true, false}) {
+    way.start();
+    int found_at = 0;
+    for (int k = 0; k < 3'000 && found_at == 0; ++k) {
+      const Vec3 read(4.0 + noise(generator), noise(generator), noise(generator));
+      if (way.step({.force_W = read,
+                    .v_W = Vec3(0.45, 0.0, 0.0),
+                    .mass_kg = 4.0,
+                    .noise_N = noise_N,
+                    .period_s = T,
+                    .limited = limited})) {
+        found_at = k;
+      }
+    }
+    EXPECT_EQ(found_at > 0, limited);
+    EXPECT_LT(found_at, 1'020);
+  }
+}
+
+// A force through the sensor's origin needs no time to be told: 20 mm and a straight line.
+TEST_F(UnexplainedWayTest, AForceThatActsAtTheSensorIsNoHandAfterTwoCentimetres) {
+  way.start();
+  int found_at = 0;
+  for (int k = 0; k < 3'000 && found_at == 0; ++k) {
+    const Vec3 read(4.0 + noise(generator), noise(generator), noise(generator));
+    if (way.step({.force_W = read,
+                  .v_W = Vec3(0.4, 0.0, 0.0),
+                  .mass_kg = 4.0,
+                  .noise_N = noise_N,
+                  .period_s = T,
+                  .as_offset = true})) {
+      found_at = k;
+    }
+  }
+  EXPECT_GT(found_at, 0);
+  EXPECT_LE(found_at, 60);
+}
+
 }  // namespace
 }  // namespace proxarm::controller
