@@ -61,6 +61,11 @@ const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& o
   return nullptr;
 }
 
+void tell_joined(const scenes::Scene& scene) {
+  const scenes::Plan plan = scenes::compile(scene).plan;
+  if (!plan.joined.empty()) std::printf("stand flush, and hold as one: %s\n", joined_text(scene, plan).c_str());
+}
+
 // The laws are those of a point's 𝒢. With a tool, what it can't be rendered in is refused beside that.
 const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOptions& options) {
   if (scene.tool) {
@@ -72,6 +77,7 @@ const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOpti
   // Distances need the place where a tool starts: they are judged together with a cell.
   const double anywhere_m = std::numeric_limits<double>::infinity();
   tell(controller::scene_doubts(scene, models::Vec3::Zero(), anywhere_m));
+  if (!scene.tool) tell_joined(scene);
   return check_laws(scene, options);
 }
 

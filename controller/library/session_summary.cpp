@@ -39,7 +39,7 @@ SummaryConfig summary_config(const command_line::PreparedSession& session) {
 
 void complete(CycleRecord& record, const command_line::PreparedSession& session, std::int64_t rendered_ns) {
   if (session.rigid) return add_clearances(record, *session.rigid, rendered_ns);
-  add_clearances(record, session.scene, rendered_ns);
+  add_clearances(record, session.scene, *session.clearances, rendered_ns);
   if (!session.impedance()) return;
   for (RecordedContact& contact : record.contacts) {
     const auto object = static_cast<std::size_t>(contact.object);

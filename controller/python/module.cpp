@@ -24,6 +24,7 @@
 #include "controller/signals/signal_columns.hpp"
 #include "models/base/quantity.hpp"
 #include "models/packed/packed.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
 
@@ -139,7 +140,7 @@ class World {
   }
   // To the nearest object where it is described; below 0 inside of one.
   [[nodiscard]] double clearance_m(py::handle x_W) const {
-    return scenes::clearance_m(*compiled_.source, vector_of<3>(x_W, "x"));
+    return scenes::Clearances(*compiled_.source).of_point(vector_of<3>(x_W, "x"));
   }
 
  private:

@@ -1,23 +1,23 @@
 #include "controller/signals/clearances.hpp"
 
 #include "controller/signals/point_contacts.hpp"
-#include "scenes/compiler/compile.hpp"
 
 namespace proxarm::controller {
 
-void add_clearances(CycleRecord& record, const scenes::Scene& scene, std::int64_t rendered_ns) {
+void add_clearances(CycleRecord& record, const scenes::Scene& scene, const scenes::Clearances& clearances,
+                    std::int64_t rendered_ns) {
   const double scene_time_s = static_cast<double>(rendered_ns) / 1e9;
   const models::Vec3 proxy_W = vec3(record.proxy_W_m);
   const models::Vec3 tool_W = vec3(record.has(RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m);
-  record.proxy_clearance_m = scenes::clearance_m(scene, proxy_W, scene_time_s, scenes::Driven::left_out);
-  record.tool_clearance_m = scenes::tool_clearance_m(scene, tool_W, proxy_W, scene_time_s, scenes::Driven::left_out);
+  record.proxy_clearance_m = clearances.of_point(proxy_W, scene_time_s, scenes::Driven::left_out);
+  record.tool_clearance_m = clearances.of_tool(tool_W, proxy_W, scene_time_s, scenes::Driven::left_out);
   place_contacts(record);
   for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
     RecordedContact& contact = record.contacts[i];
     const auto object = static_cast<std::size_t>(contact.object);
     if (contact.object < 0 || object >= scene.objects.size()) continue;
     const auto& layer = scene.objects[object].layer;
-    const auto core_m = scenes::clearance_m(scene, object, proxy_W, scene_time_s);
+    const auto core_m = clearances.of_object(object, proxy_W, scene_time_s);
     contact.gap_m = core_m.value_or(0.0) - (core_m && layer ? layer->thickness_m : 0.0);
   }
 }

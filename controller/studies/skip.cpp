@@ -11,6 +11,7 @@
 
 #include "controller/studies/common/chart.hpp"
 #include "controller/studies/stress/globe_mesh.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/compiler/obstacles.hpp"
 
@@ -93,9 +94,10 @@ double all_ns(const Scene& scene, const Vec3& at) {
     }
     return best;
   }
+  const scenes::Clearances clearances(scene);
   for (int round = 0; round < 5; ++round) {
     const auto begun = Clock::now();
-    if (scenes::clearance_m(scene, at) > -1e300) best = std::min(best, elapsed_ns(begun));
+    if (clearances.of_point(at) > -1e300) best = std::min(best, elapsed_ns(begun));
   }
   return best;
 }

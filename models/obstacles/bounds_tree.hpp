@@ -43,7 +43,8 @@ class BoundsTree {
   }
 
   // The least of distance(index) over all leaves, and at most `least`. Leaves are skipped whose box is no nearer than
-  // the best so far. Precondition: distance(index) is no less than the distance of the leaf's box.
+  // the best so far, unless x is in it. Precondition: distance(index) is no less than the distance of the leaf's box,
+  // but may be negative where x is in that.
   template <typename Distance>
   [[nodiscard]] double nearest(const Vec3& x, double least, Distance distance) const noexcept {
     if (nodes_.empty()) return least;
@@ -53,7 +54,7 @@ class BoundsTree {
     while (top > 0) {
       const Node& node = nodes_[stack[--top]];
       const double bound = std::sqrt(distance2(node.bounds, x));
-      if (!(bound < least)) continue;
+      if (!(bound < least || bound == 0.0)) continue;
       if (node.leaf) {
         least = std::min(least, distance(node.index));
       } else {

@@ -9,6 +9,7 @@
 #include "models/surfaces/contact_judge.hpp"
 #include "models/surfaces/mechanistic_map.hpp"
 #include "models/world/media.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/compiler/obstacles.hpp"
 #include "scenes/compiler/section.hpp"
@@ -213,7 +214,7 @@ std::vector<Vec3> around(const Object& object, const Space& space, Random& rando
 
 // Free points of a guide, half of them within 2 mm of an object: found from a random point by steps along the guide,
 // each as long as the clearance allows.
-std::vector<Vec3> on_guide(const Scene& scene, Random& random) {
+std::vector<Vec3> on_guide(const Scene& scene, const Clearances& clearances, Random& random) {
   GuideDescription guide = guide_in_space(scene);
   if (scene.space.dimensions < 3) {
     for (Vec3& point : guide.points_m) point = scene.space.origin_m + scene.space.axes * point;
@@ -232,13 +233,13 @@ std::vector<Vec3> on_guide(const Scene& scene, Random& random) {
     }
     const bool bounded = guide.kind == GuideDescription::Kind::polyline;
     double s = bounded ? random.uniform(0.0, 1.0) : random.uniform(-1.0, 1.0);
-    double room = clearance_m(scene, x + s * along);
+    double room = clearances.of_point(x + s * along);
     const double way = (random.uniform(0.0, 1.0) < 0.5 ? 1.0 : -1.0) / along.norm();
     for (int k = 0; k < 100 && i % 2 == 1 && room > 2e-3 && room < 1.0; ++k) {
       const double next = s + way * (room - 1e-3);
       if (bounded && !(next > 0.0 && next < 1.0)) break;
       s = next;
-      room = clearance_m(scene, x + s * along);
+      room = clearances.of_point(x + s * along);
     }
     if (room >= 0.0) places.push_back(x + s * along);
   }
@@ -281,9 +282,10 @@ CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, con
   // A proxy gets onto a guide before it meets objects.
   Random random(options.seed);
   const bool guided = scene.guide && !scene.objects.empty();
-  for (const Vec3& x : guided ? on_guide(scene, random) : places) {
+  const Clearances clearances(scene);
+  for (const Vec3& x : guided ? on_guide(scene, clearances, random) : places) {
     // Only places outside of all other objects will do.
-    if (clearance_m(scene, x) >= 0.0) region.places.push_back(compiled.from_W<N>(x));
+    if (clearances.of_point(x) >= 0.0) region.places.push_back(compiled.from_W<N>(x));
   }
   return Checker<N>(g, region, options).run();
 }

@@ -124,6 +124,7 @@ Plan plan_of(const Scene& scene, std::optional<GuideDescription> guide, const Cu
   if (plan.guide) require_no_layer(scene, plan);
   plan.only_object = only_object<N>(plan, cut);
   plan.missed = cut.missed;
+  plan.joined = cut.joined;
   if (scene.coulomb_force_N) {
     const bool alone = plan.contacts == Plan::Contacts::none && scene.media.empty();
     plan.coulomb = alone ? Plan::Coulomb::field : Plan::Coulomb::medium;
@@ -365,62 +366,6 @@ void CompiledScene::set_friction(std::size_t object, double friction) noexcept {
 bool CompiledScene::has_friction(std::size_t object) const noexcept {
   return std::any_of(friction_setters.begin(), friction_setters.end(),
                      [object](const auto& part) { return static_cast<std::size_t>(part.first) == object; });
-}
-
-double clearance_m(const Scene& scene, const Vec3& x_W) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Object& object : scene.objects) least = std::min(least, distance_to(object, x_W));
-  return least;
-}
-
-namespace {
-
-// The inverse of an object's motion since it was described.
-models::Pose back_to_description(const Object& object, double time_s) {
-  const bool moves = object.motion && !object.motion->driven;
-  return moves ? script_of(*object.motion).at(time_s).inverse(Eigen::Isometry) : models::Pose::Identity();
-}
-
-// Calls visit(object, X⁻¹) for each object whose place is known, with the inverse of its motion since it was described.
-template <typename Visit>
-void visit_objects(const Scene& scene, double time_s, Driven driven, Visit visit) {
-  for (const Object& object : scene.objects) {
-    if (object.motion && object.motion->driven && driven == Driven::left_out) continue;
-    visit(object, back_to_description(object, time_s));
-  }
-}
-
-// Whether an open mesh is between the two.
-bool separates(const Object& object, const Vec3& x, const Vec3& y) {
-  const auto* shape = std::get_if<MeshShape>(&object.shape);
-  return shape != nullptr && !shape->mesh->closed() && shape->mesh->first_hit(x, y).any();
-}
-
-}  // namespace
-
-double clearance_m(const Scene& scene, const Vec3& x_W, double time_s, Driven driven) {
-  double least = std::numeric_limits<double>::infinity();
-  visit_objects(scene, time_s, driven, [&](const Object& object, const models::Pose& X) {
-    least = std::min(least, distance_to(object, X * x_W));
-  });
-  return least;
-}
-
-std::optional<double> clearance_m(const Scene& scene, std::size_t object, const Vec3& x_W, double time_s) {
-  const Object& one = scene.objects[object];
-  if (one.motion && one.motion->driven) return std::nullopt;
-  return distance_to(one, back_to_description(one, time_s) * x_W);
-}
-
-double tool_clearance_m(const Scene& scene, const Vec3& tool_W, const Vec3& proxy_W, double time_s, Driven driven) {
-  double least = std::numeric_limits<double>::infinity();
-  visit_objects(scene, time_s, driven, [&](const Object& object, const models::Pose& X) {
-    const Vec3 tool = X * tool_W;
-    const double distance = distance_to(object, tool);
-    const double behind = object.layer ? object.layer->thickness_m : 0.0;
-    least = std::min(least, separates(object, X * proxy_W, tool) ? 2.0 * behind - distance : distance);
-  });
-  return least;
 }
 
 }  // namespace proxarm::scenes

@@ -69,18 +69,4 @@ struct CompiledScene {
 // inside an object.
 CompiledScene compile(const Scene& scene);
 
-// The distance from x_W to the nearest object, in metres: negative inside one, infinite in an empty scene. Objects that
-// move count where they are described; elastic layers count as used up. For summaries and tests, not for the cycle.
-double clearance_m(const Scene& scene, const models::Vec3& x_W);
-// The same with scripted objects where they are at time_s; the k-th step of a proxy (counted from 1) is at k T. Driven
-// objects count where they are described, or, if their places aren't known, not at all.
-enum class Driven { as_described, left_out };
-double clearance_m(const Scene& scene, const models::Vec3& x_W, double time_s, Driven driven = Driven::as_described);
-// The same of one object; none where it is driven, since its place isn't known. Precondition: object < objects.size().
-std::optional<double> clearance_m(const Scene& scene, std::size_t object, const models::Vec3& x_W, double time_s);
-// The same for a tool whose proxy is at proxy_W. An open mesh has no inside; a tool that it separates from its proxy is
-// behind it, and its distance counts as negative.
-double tool_clearance_m(const Scene& scene, const models::Vec3& tool_W, const models::Vec3& proxy_W, double time_s,
-                        Driven driven = Driven::as_described);
-
 }  // namespace proxarm::scenes

@@ -1,8 +1,11 @@
 #include "scenes/compiler/cut.hpp"
 
 #include <cmath>
+#include <cstddef>
+#include <utility>
 
 #include "models/obstacles/box_obstacle.hpp"
+#include "scenes/compiler/seams.hpp"
 #include "scenes/compiler/section.hpp"
 
 namespace proxarm::scenes {
@@ -87,10 +90,19 @@ Cut<N> cut_by_space(const Scene& scene) {
     cut.solids.clear();
     return cut;
   }
+  const auto parts = [&](const Object& object) { return N == 3 ? parts_of(scene, object) : section_of(scene, object); };
+  const Joined joined = join(scene);
+  std::vector<Solid*> solid_of(scene.objects.size(), nullptr);
   for (Solid& solid : cut.solids) {
-    const Object& object = scene.objects[static_cast<std::size_t>(solid.object)];
-    solid.parts = N == 3 ? parts_of(scene, object) : section_of(scene, object);
+    solid_of[static_cast<std::size_t>(solid.object)] = &solid;
+    solid.parts = parts(joined.objects[static_cast<std::size_t>(solid.object)]);
     if (solid.parts.empty()) cut.missed.push_back(solid.object);
+  }
+  for (const Seam& seam : joined.seams) {
+    std::vector<Part> bridges = parts(seam.bridge);
+    if (bridges.empty()) continue;
+    cut.joined.emplace_back(seam.object, seam.with);
+    for (Part& bridge : bridges) solid_of[static_cast<std::size_t>(seam.object)]->parts.push_back(std::move(bridge));
   }
   return cut;
 }

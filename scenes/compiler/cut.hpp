@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "scenes/compiler/obstacles.hpp"
@@ -37,7 +38,8 @@ struct Cut {
   std::vector<HalfSpace<N>> planes;  // flat, rigid and still, faces of boxes from inside among them
   std::vector<Ball> balls;           // rigid and still spheres, with N < 3 only
   std::vector<Solid> solids;
-  std::vector<std::int32_t> missed;  // objects that the space doesn't meet
+  std::vector<std::int32_t> missed;                           // objects that the space doesn't meet
+  std::vector<std::pair<std::int32_t, std::int32_t>> joined;  // pairs of objects that hold as one (seams.hpp)
 };
 
 // The mesh that is all there is, still and without a layer; nullptr for any other scene. In three dimensions it needs

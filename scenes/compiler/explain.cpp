@@ -40,12 +40,13 @@ StepCost measure(const Scene& scene) {
   // Free steps start from the point near the objects that has the most room.
   Vec<N> clear = Vec<N>::Zero();
   double room = -1.0;
+  const Clearances clearances(scene);
   for (std::size_t i = 0; i < 2000 && !scene.objects.empty(); ++i) {
     const Shape& shape = scene.objects[i % scene.objects.size()].shape;
     Vec3 offset;
     for (int a = 0; a < 3; ++a) offset[a] = std::sin(12.9898 * static_cast<double>(i + 1) * (a + 1.37));
     const Vec<N> x = compiled.from_W<N>(middle_of(shape) + 1.5 * size_of(shape) * offset);
-    const double d = clearance_m(scene, compiled.to_W<N>(x));
+    const double d = clearances.of_point(compiled.to_W<N>(x));
     if (d > room) {
       room = d;
       clear = x;

@@ -1,5 +1,6 @@
 #include "scenes/compiler/plan.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "models/base/setup_error.hpp"
@@ -104,6 +105,7 @@ class Narrator {
     if (plan_.guide) stage("guide on a plane", "two half-spaces back to back, among the objects");
     stage("clearance", plan_.moving > 0 ? "of no use here: something moves"
                                         : "a step that can't reach anything is q = p, without a look");
+    if (!plan_.joined.empty()) stage("no seam between objects that stand flush", joined_text(scene_, plan_));
     if (many) stage("search among " + std::to_string(plan_.surfaces) + " surfaces", "by a tree of boxes");
     stage(std::string("contact") + (has_friction() ? " with friction" : ""),
           std::string("each surface alone, exactly") + (many ? "; then pairs and triples" : ""));
@@ -164,6 +166,17 @@ class Narrator {
 };
 
 }  // namespace
+
+std::string joined_text(const Scene& scene, const Plan& plan) {
+  constexpr std::size_t told = 4;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(told, plan.joined.size()); ++i) {
+    const auto [a, b] = plan.joined[i];
+    text += (i > 0 ? ", " : "") + scene.objects[static_cast<std::size_t>(a)].name + " and " +
+            scene.objects[static_cast<std::size_t>(b)].name;
+  }
+  return plan.joined.size() > told ? text + " and " + std::to_string(plan.joined.size() - told) + " more" : text;
+}
 
 Narration narrate(const Scene& scene, const Plan& plan) { return Narrator(scene, plan).tell(); }
 

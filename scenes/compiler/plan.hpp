@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "scenes/format/scene.hpp"
@@ -40,10 +41,12 @@ struct Plan {
 
   std::optional<std::int32_t> only_object;  // the scene's object that is all of the contacts
   std::vector<std::int32_t> missed;         // objects that the proxy's space doesn't meet
-  std::size_t surfaces = 0;                 // which a World or a PlaneComposition is made of
-  std::size_t layers = 0;                   // elastic objects
-  std::size_t moving = 0;                   // objects that move
-  std::optional<GuideDescription> guide;    // in coordinates of the proxy's space
+  // Pairs of objects that stand flush and hold as one.
+  std::vector<std::pair<std::int32_t, std::int32_t>> joined;
+  std::size_t surfaces = 0;               // which a World or a PlaneComposition is made of
+  std::size_t layers = 0;                 // elastic objects
+  std::size_t moving = 0;                 // objects that move
+  std::optional<GuideDescription> guide;  // in coordinates of the proxy's space
 };
 
 // One line of what was compiled in or left out.
@@ -60,5 +63,8 @@ struct Narration {
 
 // Precondition: the plan is that of the scene.
 Narration narrate(const Scene& scene, const Plan& plan);
+
+// "box 1 and box 2, …", the first few of them.
+std::string joined_text(const Scene& scene, const Plan& plan);
 
 }  // namespace proxarm::scenes

@@ -557,6 +557,7 @@ PreparedSession prepare(const RunOptions& options) {
       loaded(chosen(options.scene, session.cell, "default_scene", session.cell.default_scene, "scenes/free.yaml"),
              FileKind::scene, scenes::load_scene);
   session.scene = controller::reachable_scene(std::move(session.scene), session.cell);
+  session.clearances = std::make_shared<const scenes::Clearances>(session.scene);
   choose_tool(session, options);
   add_delay(session.cell.sensor, options.extra_delay_s);
   session.settings = options.settings;

@@ -11,6 +11,7 @@
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
 #include "models/geometry/pose_algorithm.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/format/scene.hpp"
 
 namespace proxarm::command_line {
@@ -20,6 +21,7 @@ struct PreparedSession {
   description::SensorDescription sensor;
   description::HandDescription hand;
   scenes::Scene scene;
+  std::shared_ptr<const scenes::Clearances> clearances;  // of the scene
   std::shared_ptr<const models::PoseAlgorithm>
       rigid;  // scene and tool, for questions of room; null: the tool is a point
   controller::SessionSettings settings;

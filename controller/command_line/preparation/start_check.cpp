@@ -16,6 +16,7 @@
 #include "models/geometry/eigenvalues.hpp"
 #include "models/mesh/mesh_topology.hpp"
 #include "models/rigid_shapes/solid.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/mesh_files/mesh_report.hpp"
 
@@ -109,19 +110,18 @@ void require_turning(const PreparedSession& session, const models::Arm& arm) {
 const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
   const scenes::Object* found = nullptr;
   double least_m = std::numeric_limits<double>::infinity();
-  for (const scenes::Object& object : scene.objects) {
-    scenes::Scene alone;
-    alone.objects.push_back(object);
-    const double clearance_m = scenes::clearance_m(alone, point_W, 0.0);
+  const scenes::Clearances clearances(scene);
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const double clearance_m = clearances.of_object(i, point_W, 0.0).value_or(least_m);
     if (clearance_m >= least_m) continue;
     least_m = clearance_m;
-    found = &object;
+    found = &scene.objects[i];
   }
   return found;
 }
 
 void require_outside(const PreparedSession& session, const Vec3& start_W) {
-  const double clearance_m = scenes::clearance_m(session.scene, start_W, 0.0);
+  const double clearance_m = scenes::Clearances(session.scene).of_point(start_W);
   if (clearance_m >= -start_tolerance_m) return;
   const scenes::Object* object = deepest(session.scene, start_W);
   char depth[32];

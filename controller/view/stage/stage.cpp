@@ -58,7 +58,7 @@ void Stage::follow(const controller::Change& change, bool rendered, double perio
 void Stage::complete(CycleRecord& record, double rendered_s) const {
   const std::int64_t rendered_ns = std::llround(1e9 * rendered_s);
   if (rigid_) return controller::add_clearances(record, *rigid_, rendered_ns);
-  controller::add_clearances(record, scene_, rendered_ns);
+  controller::add_clearances(record, scene_, clearances_, rendered_ns);
 }
 
 Pose Stage::tool_pose(std::span<const Pose> links) const noexcept {

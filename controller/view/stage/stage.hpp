@@ -14,6 +14,7 @@
 #include "models/arm/link_tree.hpp"
 #include "models/description/cell.hpp"
 #include "models/geometry/pose_algorithm.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene.hpp"
 
@@ -65,6 +66,7 @@ class Stage {
  private:
   description::Cell cell_;
   scenes::Scene scene_;
+  scenes::Clearances clearances_{scene_};
   StageOptions options_;
   models::Arm arm_;
   models::LinkTree tree_;

@@ -1,5 +1,6 @@
 // From a scene's file to the smallest 𝒢 that renders it.
 #include "scenes/compiler/compile.hpp"
+#include "scenes/compiler/clearances.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,6 +14,7 @@
 #include "models/surfaces/free_space.hpp"
 #include "models/surfaces/friction_plane.hpp"
 #include "models/surfaces/plane.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/format/scene_file.hpp"
 #include "tests/source_file.hpp"
 
@@ -214,9 +216,9 @@ TEST(Compile, CutsSpheresInFewerDimensions) {
 
 TEST(Clearance, IsTheDistanceToTheNearestSurface) {
   const scenes::Scene scene = load_scene(scenes_folder / "wall.yaml");
-  EXPECT_NEAR(clearance_m(scene, {0.7, 3.0, -2.0}), 0.2, 1e-15);
-  EXPECT_NEAR(clearance_m(scene, {1.0, 3.0, -2.0}), -0.1, 1e-15);
-  EXPECT_EQ(clearance_m(load_scene(scenes_folder / "free.yaml"), Vec3::Zero()),
+  EXPECT_NEAR(scenes::Clearances(scene).of_point({0.7, 3.0, -2.0}), 0.2, 1e-15);
+  EXPECT_NEAR(scenes::Clearances(scene).of_point({1.0, 3.0, -2.0}), -0.1, 1e-15);
+  EXPECT_EQ(scenes::Clearances(load_scene(scenes_folder / "free.yaml")).of_point(Vec3::Zero()),
             std::numeric_limits<double>::infinity());
 }
 
@@ -231,20 +233,21 @@ TEST(Clearance, OfAToolBehindASheetIsNegative) {
   scene.objects.emplace_back();
   scene.objects.back().shape = shape;
   const Vec3 proxy(0.9 - shape.mesh->lift_m(), 0.1, 0.2), behind(0.9 + 381e-6, 0.1, 0.2), before(0.89, 0.1, 0.2);
-  EXPECT_NEAR(tool_clearance_m(scene, behind, proxy, 0.0), -381e-6, 1e-12);
-  EXPECT_NEAR(tool_clearance_m(scene, before, proxy, 0.0), 0.01, 1e-12);
-  EXPECT_NEAR(tool_clearance_m(scene, proxy, behind, 0.0), -shape.mesh->lift_m(), 1e-12) << "from the other side";
+  EXPECT_NEAR(scenes::Clearances(scene).of_tool(behind, proxy, 0.0), -381e-6, 1e-12);
+  EXPECT_NEAR(scenes::Clearances(scene).of_tool(before, proxy, 0.0), 0.01, 1e-12);
+  EXPECT_NEAR(scenes::Clearances(scene).of_tool(proxy, behind, 0.0), -shape.mesh->lift_m(), 1e-12)
+      << "from the other side";
   const Vec3 beside(0.95, 1.5, 0.2), led(0.9, 1.5, 0.2);
-  EXPECT_GT(tool_clearance_m(scene, beside, led, 0.0), 0.0) << "nothing is between them";
+  EXPECT_GT(scenes::Clearances(scene).of_tool(beside, led, 0.0), 0.0) << "nothing is between them";
 }
 
 // The plate of moving_plate.yaml is 20 mm thick and swings by 0.1 m along x about x = 0.9, once in 5 s.
 TEST(Clearance, IsToWhereThingsAreByThen) {
   const scenes::Scene scene = load_scene(scenes_folder / "moving_plate.yaml");
   const Vec3 x(0.7, 0.0, 0.6);
-  EXPECT_NEAR(clearance_m(scene, x, 0.0), 0.19, 1e-12);
-  EXPECT_NEAR(clearance_m(scene, x, 1.25), 0.29, 1e-12);
-  EXPECT_NEAR(clearance_m(scene, x, 3.75), 0.09, 1e-12);
+  EXPECT_NEAR(scenes::Clearances(scene).of_point(x, 0.0), 0.19, 1e-12);
+  EXPECT_NEAR(scenes::Clearances(scene).of_point(x, 1.25), 0.29, 1e-12);
+  EXPECT_NEAR(scenes::Clearances(scene).of_point(x, 3.75), 0.09, 1e-12);
 }
 
 }  // namespace

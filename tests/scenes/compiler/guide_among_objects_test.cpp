@@ -11,6 +11,7 @@
 
 #include "models/base/setup_error.hpp"
 #include "scenes/compiler/check.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
 #include "tests/allocation_count.hpp"
@@ -281,7 +282,7 @@ TEST(GuideAmongObjects, KeepsAssumption1WhilePushed) {
           }
           // The same force: another point of a polyline may be a solution, too, near its corner.
           if (guide == around && (r - Vec3(1, 0, 0)).norm() < 0.05) worst = std::min(worst, 1.0);
-          least = std::min(least, scenes::clearance_m(scene, r, 1e-3 * k));
+          least = std::min(least, scenes::Clearances(scene).of_point(r, 1e-3 * k));
           // 0.12 · 2π · 1.5 m/s and 0.4 rad/s at up to 2 m.
           ASSERT_LE((step(K, q, q) - q).norm(), 10.0 * 2e-3);
           q = r;
@@ -331,7 +332,7 @@ TEST(GuideAmongObjects, NeverEntersAnything) {
       for (std::int64_t i = 0; i < steps; ++i) {
         q = g(1e6, q + random.log_uniform(1e-9, 1.0) * random.direction<3>() + Vec3(1e-5, 0, 0), q);
         off = std::max(off, std::abs(q.z()));
-        if (i % 4 == 0) least = std::min(least, scenes::clearance_m(scene, q));
+        if (i % 4 == 0) least = std::min(least, scenes::Clearances(scene).of_point(q));
         stopped += g.contacts().size() > 1 ? 1 : 0;
         if (q.norm() > 2.0) q = Vec3::Zero();
       }

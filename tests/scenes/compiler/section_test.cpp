@@ -7,6 +7,7 @@
 
 #include "models/base/setup_error.hpp"
 #include "scenes/compiler/check.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
 #include "tests/models/surfaces/random_states.hpp"
@@ -85,7 +86,7 @@ void expect_held_by_the_solid(const Case& c) {
   std::size_t contacts = 0;
   for (std::int64_t i = 0; i < std::max(scaled(10'000), std::int64_t{10'000}); ++i) {
     q = g(1e6, q + random.log_uniform(1e-6, 0.3) * random.template direction<N>(), q);
-    const double clearance = scenes::clearance_m(scene, world.to_W(q));
+    const double clearance = scenes::Clearances(scene).of_point(world.to_W(q));
     least = std::min(least, clearance);
     if (!g.contacts().empty()) nearest = std::min(nearest, std::abs(clearance));
     contacts += g.contacts().size();
@@ -140,7 +141,7 @@ void expect_held_by_the_moving_solid(const Case& c) {
     const Vec<N> far = 1e-3 * random.template in_box<N>(1.0) + (c.room ? -2e-3 : 2e-3) * (middle - q);
     q = g(1e6, random.chance(0.5) ? q : Vec<N>(q + far), q);
     contacts += g.contacts().size();
-    if (k % 4 == 0) least = std::min(least, scenes::clearance_m(scene, world.to_W(q), T * k));
+    if (k % 4 == 0) least = std::min(least, scenes::Clearances(scene).of_point(world.to_W(q), T * k));
     ASSERT_FALSE(g.squeezed()) << c.name << " in " << N << ", step " << k;
   }
   EXPECT_GE(least, -1e-12) << c.name << " in " << N;

@@ -12,6 +12,7 @@
 
 #include "models/base/setup_error.hpp"
 #include "models/mesh/mesh_surface.hpp"
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
 #include "tests/models/mesh/mesh_shapes.hpp"
@@ -208,8 +209,8 @@ TEST_F(MeshFile, IsRenderedAsTheBoxThatItIs) {
   const Vec3 r = g(1e6, {0.1, 0.1, 1.24}, {0.1, 0.1, 1.5});
   EXPECT_LE((r - Vec3(0.1, 0.1, 1.25)).norm(), 1e-12);
   ASSERT_EQ(g.contacts().size(), 1u);
-  EXPECT_NEAR(scenes::clearance_m(alone, {0, 0, 1.5}), 0.25, 1e-15);
-  EXPECT_NEAR(scenes::clearance_m(alone, {0, 0, 1.2}), -0.05, 1e-15);
+  EXPECT_NEAR(scenes::Clearances(alone).of_point({0, 0, 1.5}), 0.25, 1e-15);
+  EXPECT_NEAR(scenes::Clearances(alone).of_point({0, 0, 1.2}), -0.05, 1e-15);
 }
 
 // A floor and a block that stands on it: held by each, and in the groove between them.
