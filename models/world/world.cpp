@@ -1,6 +1,7 @@
 #include "models/world/world.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -16,6 +17,11 @@ namespace proxarm::models {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// Up to so many obstacles that press all of their pairs and triples are tried, 10 in all. Of more, so many are chosen:
+// 20 pairs and triples, some microseconds each.
+constexpr std::size_t crowd = 4, chosen = 5;
+constexpr int most_attempts = 64;
 
 // Two objects that hold the proxy between them, each by one of its features.
 struct PairOfSurfaces {
@@ -63,6 +69,62 @@ SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, con
   out.groove.found = false;
   return out;
 }
+
+// Up to three planes that hold a point, and the nearest point to p on their free side.
+class HoldingPlanes {
+ public:
+  // Takes one more plane in, and lets those go that don't hold any more. False if no point is found.
+  bool exchange(const Obstacle::Step& plane, const Vec3& p, Vec3& r) noexcept {
+    std::array<const Obstacle::Step*, 4> all{&plane};
+    for (std::size_t i = 0; i < count_; ++i) all[i + 1] = planes_[i];
+    // Of all sets of them, the smallest ones first, the one whose point is on the free side of all.
+    const unsigned sets = 1u << (count_ + 1);
+    for (int size = 1; size <= 3; ++size) {
+      for (unsigned set = 1; set < sets; ++set) {
+        if (std::popcount(set) == size && hold(all, set, p, r)) return true;
+      }
+    }
+    return false;
+  }
+  [[nodiscard]] bool has(const Obstacle::Step& plane) const noexcept {
+    const auto end = planes_.begin() + static_cast<std::ptrdiff_t>(count_);
+    return std::find(planes_.begin(), end, &plane) != end;
+  }
+
+ private:
+  bool hold(const std::array<const Obstacle::Step*, 4>& all, unsigned set, const Vec3& p, Vec3& r) noexcept {
+    std::array<const Obstacle::Step*, 3> planes{};
+    Mat3 G = Mat3::Identity();  // of the normals; beyond the set's size, nothing
+    Vec3 depth = Vec3::Zero();
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if ((set & 1u << i) == 0) continue;
+      planes[n] = all[i];
+      const auto row = static_cast<Eigen::Index>(n);
+      depth[row] = all[i]->normal.dot(all[i]->r - p);
+      for (std::size_t j = 0; j < n; ++j) {
+        const auto column = static_cast<Eigen::Index>(j);
+        G(row, column) = G(column, row) = planes[j]->normal.dot(all[i]->normal);
+      }
+      ++n;
+    }
+    const Vec3 share = G.ldlt().solve(depth);
+    if (!share.allFinite() || share.minCoeff() < 0.0) return false;
+    Vec3 x = p;
+    for (std::size_t i = 0; i < n; ++i) x += share[static_cast<Eigen::Index>(i)] * planes[i]->normal;
+    const double rounding = 1e-9 * (x - p).norm();
+    for (std::size_t i = 0; i <= count_; ++i) {
+      if (all[i]->normal.dot(all[i]->r - x) > rounding) return false;
+    }
+    planes_ = planes;
+    count_ = n;
+    r = x;
+    return true;
+  }
+
+  std::array<const Obstacle::Step*, 3> planes_{};
+  std::size_t count_ = 0;
+};
 
 }  // namespace
 
@@ -123,6 +185,7 @@ World::World(std::vector<Entry> entries) : entries_(std::move(entries)) {
   }
   tree_ = BoundsTree(std::move(leaves));
   near_.reserve(entries_.size());
+  pressed_.reserve(entries_.size());
 }
 
 void World::set_time(const StepTime& time) noexcept {
@@ -157,11 +220,60 @@ double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
   return radius;
 }
 
-void World::add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept {
+void World::add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) noexcept {
+  pressed_.clear();
   for (const std::size_t i : near_) {
     const Obstacle::Step s = entries_[i].obstacle->step(K, p, q);
-    if (s.touches) candidates.add(i, s);
+    if (s.touches) pressed_.push_back({i, s});
   }
+  if (pressed_.size() > crowd && !soft_) choose(K, p, q);
+  for (const Pressed& pressed : pressed_) candidates.add(pressed.index, pressed.step);
+}
+
+// Adds to pressed_ what isn't in the way to p, but in the way to r. True if there is any.
+bool World::add_those_at(double K, const Vec3& p, const Vec3& q, const Vec3& r) noexcept {
+  const std::size_t before = pressed_.size();
+  for (const std::size_t i : near_) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    if (!obstacle.excludes(obstacle.carry(q), r)) continue;
+    const auto known = [i](const Pressed& pressed) { return pressed.index == i; };
+    if (std::any_of(pressed_.begin(), pressed_.end(), known)) continue;
+    Obstacle::Step s = obstacle.step(K, r, q);
+    if (!s.touches) continue;
+    s.touches = obstacle.step(K, p, q).touches;
+    pressed_.push_back({i, s});
+  }
+  return pressed_.size() > before;
+}
+
+// Leaves those of pressed_ that hold the proxy if each is the plane that would hold it alone, and nothing rubs, and
+// then those that are next: the projection of p onto a polyhedron. Of the planes that hold the point, and the one that
+// it is deepest behind, the nearest point on their free side comes next, until it is on the free side of all (a dual
+// method: the distance to p grows each time, so that no set comes twice). A billionth of that distance is let pass.
+void World::choose(double K, const Vec3& p, const Vec3& q) noexcept {
+  constexpr int most_exchanges = 64;
+  constexpr double passed = 1e-9;
+  HoldingPlanes holding;
+  Vec3 r = p;
+  const auto depth = [&r](const Pressed& plane) { return plane.step.normal.dot(plane.step.r - r); };
+  const auto deeper = [&](const Pressed& a, const Pressed& b) { return depth(a) > depth(b); };
+  for (int k = 0; k < most_exchanges; ++k) {
+    const Pressed& deepest = *std::min_element(pressed_.begin(), pressed_.end(), deeper);
+    if (depth(deepest) > passed * (r - p).norm() ? !holding.exchange(deepest.step, p, r) : !add_those_at(K, p, q, r))
+      break;
+  }
+  likely_count_ = 0;
+  for (const Pressed& pressed : pressed_) {
+    if (holding.has(pressed.step)) likely_[likely_count_++] = pressed.index;
+  }
+  // Those that hold it have a depth of zero, others less; then in the order in which they were, on which results
+  // depend.
+  std::partial_sort(pressed_.begin(), pressed_.begin() + chosen, pressed_.end(),
+                    [&](const Pressed& a, const Pressed& b) {
+                      return depth(a) != depth(b) ? depth(a) > depth(b) : a.index < b.index;
+                    });
+  pressed_.resize(chosen);
+  std::sort(pressed_.begin(), pressed_.end(), [](const Pressed& a, const Pressed& b) { return a.index < b.index; });
 }
 
 // Whether the proxy gets from q to r around an obstacle that is in the straight way: over the edge where the obstacle
@@ -196,7 +308,10 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
     if (known) {
       add_face(i, s, candidates);
     } else {
-      s.touches = s.touches && obstacle.step(K, p, q).touches;
+      // One that is in the way to p, too, but wasn't chosen from the crowd, holds the proxy alone where it would then.
+      const Obstacle::Step alone = obstacle.step(K, p, q);
+      if (s.touches && alone.touches) s = alone;
+      s.touches = alone.touches && s.touches;
       candidates.add(i, s);
     }
   }
@@ -237,7 +352,8 @@ Contact<3> World::contact_of(const Candidates& candidates, std::size_t candidate
 }
 
 void World::try_pair(double K, const Vec3& p, const Vec3& q, std::array<std::size_t, 2> own, Candidates& candidates,
-                     Choice& choice) const noexcept {
+                     Choice& choice) noexcept {
+  if (!may_try()) return;
   if (candidates.index[own[0]] > candidates.index[own[1]]) std::swap(own[0], own[1]);
   const std::size_t m[2] = {candidates.index[own[0]], candidates.index[own[1]]};
   if (elastic_[m[0]] || elastic_[m[1]]) return;
@@ -253,7 +369,8 @@ void World::try_pair(double K, const Vec3& p, const Vec3& q, std::array<std::siz
 
 // Solves the corner of three tangent planes, which are taken again at each new corner until it settles.
 void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<std::size_t, 3>& own,
-                       Candidates& candidates, Choice& choice) const noexcept {
+                       Candidates& candidates, Choice& choice) noexcept {
+  if (!may_try()) return;
   const std::size_t m[3] = {candidates.index[own[0]], candidates.index[own[1]], candidates.index[own[2]]};
   if (elastic_[m[0]] || elastic_[m[1]] || elastic_[m[2]]) return;
   Vec3 r = q, carried[3];
@@ -288,6 +405,27 @@ void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<
   for (std::size_t j = 0; j < 3; ++j) {
     choice.contacts[j] = contact_of(candidates, own[j], s.slips[j], t[j].surface.normal());
   }
+}
+
+// In a crowd: one alone, or else those that would hold the proxy without friction. Before all other sets, since each of
+// these that fails brings in more of the crowd.
+bool World::try_likely(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
+  try_singles(K, p, q, candidates, choice);
+  if (choice.found() || likely_count_ < 2) return choice.found();
+  std::array<std::size_t, 3> own{};
+  for (std::size_t i = 0; i < likely_count_; ++i) {
+    const auto end = candidates.index.begin() + static_cast<std::ptrdiff_t>(candidates.count);
+    const auto at = std::find(candidates.index.begin(), end, likely_[i]);
+    if (at == end) return false;
+    own[i] = static_cast<std::size_t>(at - candidates.index.begin());
+  }
+  std::sort(own.begin(), own.begin() + static_cast<std::ptrdiff_t>(likely_count_));
+  if (likely_count_ == 2) {
+    try_pair(K, p, q, {own[0], own[1]}, candidates, choice);
+  } else {
+    try_triple(K, p, q, own, candidates, choice);
+  }
+  return choice.found();
 }
 
 // Tries all candidates at once if one of them has an elastic layer: those that press share the force.
@@ -380,11 +518,14 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexce
   Candidates& candidates = candidates_;
   candidates.clear();
   add_candidates(K, p, q, candidates);
+  const bool crowded = candidates.count > crowd && !soft_;
+  attempts_left_ = crowded ? most_attempts : std::numeric_limits<int>::max();
   choice.free = candidates.count == 0;
   if (choice.free) {
     choice.r = p;
     return true;
   }
+  if (crowded && try_likely(K, p, q, candidates, choice)) return choice.resolved;
   if (search(K, p, q, candidates, choice)) return choice.resolved;
   candidates.around = true;
   if (search(K, p, q, candidates, choice)) return choice.resolved;

@@ -6,6 +6,11 @@
 // (settling.hpp); the error shrinks by penetration over radius each time. Among complete sets, fewer contacts come
 // first, then the smallest ‖r − p‖.
 //
+// Where many objects meet in one place, pairs and triples of all that press would be too many: from the fifth on, those
+// are chosen that hold the proxy without friction (World::choose), these are tried first, then their sets, and no more
+// than most_attempts in a step. So a step among a thousand objects costs little more than one among ten; what isn't
+// found within that counts as unresolved.
+//
 // Where an elastic layer presses together with other obstacles, all that press share the force (shared_support.hpp).
 //
 // A step is first compared with the last known clearance: if both q and p are within it, the step touches nothing.
@@ -79,8 +84,17 @@ class World final : public GeometricAlgorithm<3> {
   };
   struct Choice;
 
+  // An obstacle that would hold the proxy alone.
+  struct Pressed {
+    std::size_t index = 0;
+    Obstacle::Step step;
+  };
+
   double gather(const Vec3& p, const Vec3& q, double reach) noexcept;
-  void add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept;
+  void add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) noexcept;
+  void choose(double K, const Vec3& p, const Vec3& q) noexcept;
+  bool add_those_at(double K, const Vec3& p, const Vec3& q, const Vec3& r) noexcept;
+  [[nodiscard]] bool may_try() noexcept { return attempts_left_-- > 0; }
   static void add_face(std::size_t i, const Obstacle::Step& step, Candidates& candidates) noexcept;
   [[nodiscard]] bool is_free(const Vec3& q, const Vec3& r) const noexcept;
   bool fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
@@ -91,9 +105,10 @@ class World final : public GeometricAlgorithm<3> {
   [[nodiscard]] Contact<3> contact_of(const Candidates& candidates, std::size_t candidate, bool slips,
                                       const Vec3& normal) const noexcept;
   void try_pair(double K, const Vec3& p, const Vec3& q, std::array<std::size_t, 2> own, Candidates& candidates,
-                Choice& choice) const noexcept;
+                Choice& choice) noexcept;
   void try_triple(double K, const Vec3& p, const Vec3& q, const std::array<std::size_t, 3>& own, Candidates& candidates,
-                  Choice& choice) const noexcept;
+                  Choice& choice) noexcept;
+  bool try_likely(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept;
   void try_together(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept;
   bool search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept;
 
@@ -117,6 +132,10 @@ class World final : public GeometricAlgorithm<3> {
   std::array<Contact<3>, 3> contacts_{};
   std::array<Contact<3>, Candidates::most> shared_{};  // instead of those, where elastic ones share the force
   bool are_shared_ = false;
+  std::vector<Pressed> pressed_;         // of this step; room for all
+  std::array<std::size_t, 3> likely_{};  // obstacles of a crowd that would hold the proxy without friction
+  std::size_t likely_count_ = 0;
+  int attempts_left_ = 0;   // pairs and triples that may still be tried in this step
   int support_budget_ = 0;  // what SharedSupport may still spend in this step
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;
