@@ -237,7 +237,21 @@ std::string summary_json(const Summary& summary);
 // own.
 std::string repeatable_json(const Summary& summary);
 std::string timing_json(const Summary& summary);
-// For people: a table of some twenty lines.
-std::string summary_text(const Summary& summary);
+
+// What the session comes to, in one word for programs and one sentence for people.
+enum class VerdictTone { good, look, bad };
+struct SummaryVerdict {
+  VerdictTone tone = VerdictTone::good;
+  const char* word = "fine";  // fine, look, swings, fault: the first thing that a user has to know
+  std::string text;
+};
+SummaryVerdict judge(const Summary& summary);
+
+struct SummaryLook {
+  bool verbose = true;  // all figures: some twenty lines; else eight, and one for each thing that went wrong
+  bool colour = false;  // of the verdict and what went wrong, for terminals (terminal.hpp)
+};
+// For people: a table of names and values.
+std::string summary_text(const Summary& summary, const SummaryLook& look = {});
 
 }  // namespace proxarm::controller

@@ -79,6 +79,7 @@ struct RunOptions {
   std::filesystem::path plot_file;                                    // empty: proxarm-run.svg, none with --json
   bool plot = true;
   bool json = false;
+  bool verbose = false;  // all figures in the summary, not the eight lines
   bool force_unstable = false;
   bool view = false;                         // show the session in a browser
   bool view_control = false;                 // and let it be changed there

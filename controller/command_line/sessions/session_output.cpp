@@ -11,6 +11,7 @@
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
 #include "controller/library/session_summary.hpp"
+#include "controller/report/terminal.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -334,7 +335,8 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   if (options_.json) {
     std::printf("%s\n", controller::summary_json(summary).c_str());
   } else {
-    std::printf("%s%s", controller::summary_text(summary).c_str(), clocks_text(summary, options_).c_str());
+    const controller::SummaryLook look{.verbose = options_.verbose, .colour = controller::shows_colour(stdout)};
+    std::printf("%s%s", controller::summary_text(summary, look).c_str(), clocks_text(summary, options_).c_str());
   }
   std::fflush(stdout);
   const bool drawn = draw_plot();
