@@ -7,7 +7,8 @@
 #include <numbers>
 #include <sstream>
 
-#include "controller/report/gnuplot.hpp"
+#include "controller/drawing/gnuplot.hpp"
+#include "controller/drawing/palette.hpp"
 #include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::controller {
@@ -18,14 +19,6 @@ using models::Vec3;
 
 constexpr std::size_t most_samples = 4000;
 constexpr double nothing_rad = 1e-6;  // its axis is known to 1e-9
-
-// Colours of the browser's view (controller/view/page/style.css): --tool, --proxy, which is the contact's as well, and
-// --hand; --shade-stick and --shade-slip on white.
-constexpr const char* tool_colour = "#b35900";
-constexpr const char* proxy_colour = "#0072b2";
-constexpr const char* hand_colour = "#6b3fa0";
-constexpr const char* stick_ground = "#ddecf5";
-constexpr const char* slip_ground = "#f9e7d9";
 
 // Of the picture, in pixels.
 constexpr double head = 98.0, row_height = 236.0, between_rows = 21.0, foot = 108.0;
@@ -230,16 +223,17 @@ PlotBuilder::Ranges PlotBuilder::ranges(const Axes& axes) const {
 
 std::string PlotBuilder::script(const Axes& axes) const {
   std::ostringstream gp;
+  const std::string hand = css(on_white(colour("hand").light));
   const double from = samples_.front().time_s, to = std::max(samples_.back().time_s, from + 1e-3);
   gp << "set terminal svg size 1200," << height_px() << " font 'sans,21' background 'white' noenhanced\n"
      << "set output 'plot.svg'\nset encoding utf8\n"
-     << "set style line 1 lc rgb '" << tool_colour << "' lw 3.2\n"
-     << "set style line 2 lc rgb '" << proxy_colour << "' lw 1.8 dt (8,6)\n"
-     << "set style line 3 lc rgb '" << proxy_colour << "' lw 2.4 dt (10,5)\n"  // contact
-     << "set style line 4 lc rgb '#009e73' lw 2.8 dt (2,4)\n"                  // friction
-     << "set style line 5 lc rgb '" << hand_colour << "' lw 3.2\n"
-     << "set style line 6 lc rgb '" << hand_colour << "' lw 2.4 dt (10,5)\n"  // of a hand alone: y
-     << "set style line 7 lc rgb '" << hand_colour << "' lw 2.8 dt (2,4)\n"   // and z
+     << "set style line 1 " << gnuplot_line("tool") << " lw 3.2\nset style line 2 " << gnuplot_line("proxy")
+     << " lw 1.8\nset style line 3 " << gnuplot_line("contact") << " lw 2.4\nset style line 4 "
+     << gnuplot_line("friction") << " lw 2.8\nset style line 5 " << gnuplot_line("hand")
+     << " lw 3.2\n"
+     // Of a hand alone: y and z.
+     << "set style line 6 lc rgb '" << hand << "' lw 2.4 dt (10,5)\nset style line 7 lc rgb '" << hand
+     << "' lw 2.8 dt (2,4)\n"
      << "set xrange [" << from << ":" << to << "]\nset grid lc rgb '#b0b0b0' lw 0.6\n"
      << "set lmargin 11\nset rmargin 3\nset format x ''\n";
   const double top = 1.0 - 23.0 / height_px();
@@ -261,7 +255,8 @@ std::string PlotBuilder::shade_contacts(std::ostream& gp, double shortest_labell
     if (band.contact == ContactPhase::free) continue;
     const bool slip = band.contact == ContactPhase::slip;
     gp << "set object " << ++object << " rectangle from " << band.from_s << ", graph 0 to " << band.to_s
-       << ", graph 1 fillcolor rgb '" << (slip ? slip_ground : stick_ground) << "' fillstyle solid noborder behind\n";
+       << ", graph 1 fillcolor rgb '" << css(on_white(colour(slip ? "shade-slip" : "shade-stick").light))
+       << "' fillstyle solid noborder behind\n";
     if (band.to_s - band.from_s <= shortest_labelled_s) continue;
     labels << "set label " << object << " '" << contact_phase_name(band.contact) << "' at "
            << 0.5 * (band.from_s + band.to_s) << ", graph 1.07 center\n";

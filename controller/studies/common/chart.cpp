@@ -5,37 +5,19 @@
 #include <cmath>
 #include <sstream>
 
-#include "controller/report/gnuplot.hpp"
+#include "controller/drawing/gnuplot.hpp"
+#include "controller/drawing/palette.hpp"
 
 namespace proxarm::studies {
 namespace {
 
 using controller::gnuplot_string;
 
-struct Style {
-  const char* colour;
-  double width;
-  const char* dash;
-  int mark;
-};
-
-// Okabe and Ito's colours, told apart by the colour-blind.
-constexpr std::array<Style, 10> styles{{{"#0072b2", 2.6, "solid", 7},
-                                        {"#000000", 1.8, "(9,5)", 6},
-                                        {"#d55e00", 2.4, "(14,5)", 5},
-                                        {"#009e73", 2.6, "(2,4)", 9},
-                                        {"#cc79a7", 2.4, "(12,4,2,4)", 8},
-                                        {"#e69f00", 2.4, "(6,3)", 13},
-                                        {"#56b4e9", 2.0, "(4,4)", 11},
-                                        {"#7f7f7f", 1.6, "solid", 4},
-                                        {"#7a0177", 2.0, "(16,4,2,4,2,4)", 12},
-                                        {"#8c510a", 2.0, "(3,2)", 10}}};
-
 void define_styles(std::ostream& gp) {
-  for (std::size_t i = 0; i < styles.size(); ++i) {
-    const Style& s = styles[i];
-    gp << "set style line " << i + 1 << " lc rgb '" << s.colour << "' lw " << s.width << " pt " << s.mark
-       << " ps 0.9 dt " << s.dash << "\n";
+  int number = 0;
+  for (const controller::SeriesStyle& s : controller::series_styles()) {
+    gp << "set style line " << ++number << " lc rgb '" << s.colour << "' lw " << s.width << " pt " << s.mark
+       << " ps 0.9 " << controller::gnuplot_dash(s.dash) << "\n";
   }
 }
 
@@ -147,7 +129,7 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
         }
       }
       data << "\n\n";
-      const std::size_t style = static_cast<std::size_t>(curve.style) % styles.size() + 1;
+      const std::size_t style = static_cast<std::size_t>(curve.style) % controller::series_styles().size() + 1;
       if (plot.size() > 5) plot += ", ";
       plot += "'data' index " + std::to_string(block++) + " using 1:2 with " +
               (curve.line ? (curve.marks ? "linespoints" : "lines") : "points") + " ls " + std::to_string(style) +
