@@ -247,6 +247,9 @@ struct SummaryVerdict {
 };
 SummaryVerdict judge(const Summary& summary);
 
+// One line above the picture of a session (plot.hpp): what was felt of what was wanted, and how true the touch was.
+std::string plot_headline(const Summary& summary);
+
 struct SummaryLook {
   bool verbose = true;  // all figures: some twenty lines; else eight, and one for each thing that went wrong
   bool colour = false;  // of the verdict and what went wrong, for terminals (terminal.hpp)

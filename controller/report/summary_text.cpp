@@ -387,6 +387,19 @@ SummaryVerdict judge(const Summary& s) {
   return {VerdictTone::good, "fine", "fine: no fault, nothing swung"};
 }
 
+std::string plot_headline(const Summary& s) {
+  const SummaryVerdict verdict = judge(s);
+  if (verdict.tone == VerdictTone::bad) return verdict.text;
+  std::string text;
+  if (s.apparent_mass_kg && s.wanted_mass_kg > 0.0) {
+    text = format("%.3g kg felt ", *s.apparent_mass_kg) + format("of %.3g kg wanted", s.wanted_mass_kg);
+  }
+  if (s.contacts == 0) return text + (text.empty() ? "nothing was touched" : "; nothing was touched");
+  text += (text.empty() ? "tool within " : "; tool within ") + length(s.tool_penetration_max_m) + " of what it touches";
+  if (s.contact_force_error_N) text += format(", its force within %.2g N", *s.contact_force_error_N);
+  return text;
+}
+
 std::string summary_text(const Summary& s, const SummaryLook& look) {
   Lines line(look.colour);
   if (look.verbose) {

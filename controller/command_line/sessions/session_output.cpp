@@ -339,7 +339,7 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
     std::printf("%s%s", controller::summary_text(summary, look).c_str(), clocks_text(summary, options_).c_str());
   }
   std::fflush(stdout);
-  const bool drawn = draw_plot();
+  const bool drawn = draw_plot(summary);
   if (writer_) writer_->finish(summary);
   if (ended_by_fault) {
     if (!options_.json && !summary.black_box.empty()) {
@@ -351,7 +351,7 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   return summary.oscillation && summary.oscillation->lasts ? fault_ended_the_run : fine;
 }
 
-bool SessionOutput::draw_plot() {
+bool SessionOutput::draw_plot(const Summary& summary) {
   if (!plot_) return true;
   if (plot_->is_empty()) {  // as of a session that was stopped before; whoever stops it knows
     if (!options_.json) std::printf("  plot:                     none; nothing was rendered\n");
@@ -359,7 +359,7 @@ bool SessionOutput::draw_plot() {
   }
   fs::path file = options_.plot_file;
   if (file.empty()) file = options_.record_dir.empty() ? fs::path(default_plot) : options_.record_dir / "plot.svg";
-  const std::string warning = plot_->write(file);
+  const std::string warning = plot_->write(file, controller::plot_headline(summary));
   if (!warning.empty()) {
     std::fprintf(stderr, "proxarm: %s\n", warning.c_str());
   } else if (!options_.json) {
