@@ -30,6 +30,7 @@ const SESSION_FIGURES = [
   ['hand’s torque', (m) => newtonMetres(m, 'torque'), feelsTorque],
   ['force of contact', (m) => (m.contact ? newtons(m.contact_N) : '—')],
   ['torque of contact', (m) => (m.contact ? newtonMetres(m, 'contact_torque') : '—'), feelsTorque],
+  ['last impact', (m) => (m.blow_Ns > 0 ? `${m.blow_Ns.toPrecision(3)} Ns` : '—'), (m) => Number.isFinite(m.blow_Ns)],
   ['touches', (m, stage) => (m.contact ? name(stage, m) : 'nothing')],
   ['friction μ', (m) => (m.contact ? m.friction.toFixed(3) : '—')],
   ['proxy to surface', (m) => length(m.proxy_clearance_m)],

@@ -119,6 +119,12 @@ class Plot {
     box.append(this.canvas);
     parent.append(box);
     this.context = this.canvas.getContext('2d');
+    this.values = document.createElement('div');
+    this.values.className = 'values';
+    this.values.hidden = true;
+    box.append(this.values);
+    box.addEventListener('pointermove', (event) => { this.pointer = event.offsetX; this.stale = true; });
+    box.addEventListener('pointerleave', () => { this.pointer = undefined; this.stale = true; });
     new ResizeObserver(() => this.resize()).observe(box);
   }
 
@@ -205,6 +211,31 @@ class Plot {
       c.stroke();
     }
     this.drawHead();
+    this.tellPointed(rows, from, to, x);
+  }
+
+  // The values under the pointer, of the row that is nearest to it.
+  tellPointed(rows, from, to, x) {
+    const inside = this.pointer >= LEFT && this.pointer <= this.width - RIGHT && rows.length > 0;
+    this.values.hidden = !inside;
+    if (!inside) return;
+    const time = from + ((this.pointer - LEFT) / (this.width - LEFT - RIGHT)) * (to - from);
+    const row = rows.reduce((best, one) => (Math.abs(one.time_s - time) < Math.abs(best.time_s - time) ? one : best));
+    const { unit, lines } = this.description, c = this.context;
+    const told = lines.map((line) => [line.name, line.value(row)]).filter(([, value]) => Number.isFinite(value));
+    this.values.textContent = [`${row.time_s.toFixed(3)} s`, ...told.map(([name, value]) => `${name} ${Number(value.toPrecision(4))}`)]
+      .join('\n') + (told.length ? ` ${unit}` : '');
+    c.strokeStyle = colour('--ink');
+    c.lineWidth = 1;
+    c.setLineDash(dash('peaks'));
+    c.beginPath();
+    c.moveTo(x(row.time_s), this.top);
+    c.lineTo(x(row.time_s), this.height - BOTTOM);
+    c.stroke();
+    c.setLineDash([]);
+    const right = x(row.time_s) > this.width / 2;
+    this.values.style.left = right ? '' : `${x(row.time_s) + 6}px`;
+    this.values.style.right = right ? `${this.width - x(row.time_s) + 6}px` : '';
   }
 
   shade(rows, x) {
