@@ -49,6 +49,7 @@
 #include "controller/record/page_faults.hpp"
 #include "controller/report/apparent_mass.hpp"
 #include "controller/report/oscillation.hpp"
+#include "controller/stability/passed_poses.hpp"
 #include "controller/stability/verdict.hpp"
 #include "controller/supervision/fault.hpp"
 
@@ -149,6 +150,7 @@ struct PassivitySummary {
 struct PosesSummary {
   std::size_t judged = 0;
   std::optional<UnstablePlaces> unstable;  // times after the first cycle; absent: it was
+  std::vector<PassedPoses::Place> places;  // with the smallest stable mass, where that was looked for
 };
 // "at 3.2 s the arm came …".
 std::string poses_text(const UnstablePlaces& there);

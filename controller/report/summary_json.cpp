@@ -89,7 +89,12 @@ Json passivity(const std::optional<PassivitySummary>& summary) {
 
 Json poses(const std::optional<PosesSummary>& summary) {
   if (!summary) return nullptr;
-  Json json{{"judged", summary->judged}, {"unstable", nullptr}};
+  Json json{{"judged", summary->judged}, {"unstable", nullptr}, {"places", Json::array()}};
+  for (const PassedPoses::Place& place : summary->places) {
+    json["places"].push_back({{"time_s", place.time_s},
+                              {"felt_mass_kg", place.felt_mass_kg},
+                              {"smallest_stable_mass_kg", place.smallest_stable_mass_kg}});
+  }
   if (!summary->unstable) return json;
   const UnstablePlaces& there = *summary->unstable;
   const auto smallest = [&](bool is_lacking) { return is_lacking ? there.smallest_stable : std::nullopt; };

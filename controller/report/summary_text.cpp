@@ -358,10 +358,21 @@ void tell_in_brief(const Summary& s, Lines& line) {
   tell_faults(s, line);
 }
 
+// Where the mass felt was nearest to the smallest that is stable; nothing where that wasn't looked for.
+void tell_margin(const Summary& s, Lines& line) {
+  const auto share = [](const PassedPoses::Place& place) {
+    return place.smallest_stable_mass_kg ? place.felt_mass_kg / *place.smallest_stable_mass_kg : 0.0;
+  };
+  if (!s.poses || s.poses->places.empty()) return;
+  const auto nearest = std::ranges::min_element(s.poses->places, {}, share);
+  line("over smallest stable", format("%.2f times at least, ", share(*nearest)) + format("at %.2f s", nearest->time_s));
+}
+
 void tell_everything(const Summary& s, Lines& line) {
   tell_time(s, line);
   tell_motion(s, line);
   tell_oscillation(s, line);
+  tell_margin(s, line);
   if (s.poses && s.poses->unstable) line("not stable everywhere", poses_text(*s.poses->unstable), VerdictTone::look);
   tell_limits(s, line);
   if (s.hands_off_s > 0.0) line("hands off", hands_off(s));

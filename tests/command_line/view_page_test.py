@@ -1,5 +1,6 @@
 """The page of the view in a real browser: what stands in its scene graph, and what is to be seen in its pixels."""
 import csv
+import json
 import math
 import os
 import re
@@ -469,6 +470,14 @@ class Page(ProgramTest):
                         self.assertAlmostEqual(aside, math.hypot(*(a - up * n for a, n in zip(apart, normal))), delta=1e-8)
                 bar = browser.run("return proxarm.microscope.bar_m")
                 self.assertTrue(1e-6 <= bar <= 1e-2, bar)
+            # How far from swinging it is there, as the session's judge had it.
+            with open(self.folder / "session" / "summary.json") as file:
+                places = json.load(file)["poses"]["places"]
+            self.assertGreater(len(places), 4)
+            now = browser.run("return proxarm.panel.moment.time_s")
+            place = [place for place in places if place["time_s"] <= now][-1]
+            self.assertIn(f"{4.0 / place['smallest_stable_mass_kg']:.2f} (of {place['smallest_stable_mass_kg']:.2g} kg)",
+                          browser.run("return document.getElementById('figures').innerText"))
             # An impact is told as the impulse that it is, not by its force in a cycle.
             begin = next(i for i in touching if rows[i - 1]["contact"] == "free")
             size = lambda row, name: math.hypot(*(float(row[f"{name}_W_{axis}_N"]) for axis in "xyz"))

@@ -46,6 +46,7 @@ class BusMapping {
 struct ViewPlace {
   std::uint16_t port = 0;
   std::size_t most_viewers = 0;
+  int line = -1;  // the socket to its process
 };
 
 struct RunOptions {

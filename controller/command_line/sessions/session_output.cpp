@@ -10,6 +10,7 @@
 #include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
+#include "controller/command_line/sessions/view_process.hpp"
 #include "controller/library/session_summary.hpp"
 #include "controller/report/terminal.hpp"
 #include "models/arm/tool_space.hpp"
@@ -82,6 +83,7 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   if (!session.impedance()) {
     poses_ = std::make_unique<PoseWatch>(controller::PassedPoses(deriver_.arm(), session.cell, hand_model(session),
                                                                  session.loop, turned_model(session)));
+    if (options.view_place || !options.record_dir.empty()) poses_->find_smallest();
   }
   swing_ = slowest_swing(session);
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
@@ -256,6 +258,9 @@ void SessionOutput::judge_pose(const CycleRecord& record) {
   const models::ToolPose tool_W{controller::vec3(record.tool_W_m),
                                 turns ? models::Quaternion(record.proxy_q_W.data()) : models::Quaternion::Identity()};
   poses_->pass(1e-9 * static_cast<double>(record.time_ns), tool_W, felt, joints_rad);
+  if (options_.view_place) {
+    for (const controller::PassedPoses::Place& place : poses_->places()) tell_margin(*options_.view_place, place);
+  }
   say_poses();
 }
 
