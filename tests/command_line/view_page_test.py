@@ -476,7 +476,7 @@ class Page(ProgramTest):
             self.assertGreater(len(places), 4)
             now = browser.run("return proxarm.panel.moment.time_s")
             place = [place for place in places if place["time_s"] <= now][-1]
-            self.assertIn(f"{4.0 / place['smallest_stable_mass_kg']:.2f} (of {place['smallest_stable_mass_kg']:.2g} kg)",
+            self.assertIn(f"{place['smallest_stable_mass_kg']:.2g} kg ({4.0 / place['smallest_stable_mass_kg']:.2f} ×)",
                           browser.run("return document.getElementById('figures').innerText"))
             # An impact is told as the impulse that it is, not by its force in a cycle.
             begin = next(i for i in touching if rows[i - 1]["contact"] == "free")
@@ -498,6 +498,34 @@ class Page(ProgramTest):
             self.assertRegex(told, r"^[\d.]+ s\npeaks [\d.]+\nhand [\d.]+\ncontact [\d.]+ N$")
             browser.press("m", text="m")
             browser.until("document.getElementById('microscope').hidden", "without it")
+            self.assertEqual(browser.complaints(), [])
+
+    def test_what_is_felt_stands_beside_what_is_meant(self):
+        """A mass by force over acceleration, and a layer's spring by force over depth, both as the scene has them."""
+        self.call("run", "--no-plot", "--record", "shaken", "--duration", "8s", "--scene", SOURCE / "scenes/free.yaml",
+                  "--hand", SOURCE / "sim/hands/sweep.yaml")
+        self.call("run", "--no-plot", "--record", "foam", "--duration", "8s", "--scene", SOURCE / "scenes/soft_wall.yaml")
+        with view_browser.Browser() as browser:
+            with Session(self.folder, "view", "shaken") as session:
+                self.opened(browser, session)
+                browser.run("proxarm.player.goTo(4000)")
+                browser.until("proxarm.player.isShown(4000)", "that cycle")
+                felt = browser.until("proxarm.felt.points?.length > 100 && proxarm.felt.felt_kg", "points")
+                self.assertAlmostEqual(felt, 4.0, delta=0.2)
+                self.assertIn("which no hand tells from what is meant", browser.run("return document.querySelector('#felt p').textContent"))
+            with Session(self.folder, "view", "foam") as session:
+                self.opened(browser, session)
+                browser.run("proxarm.player.goTo(6000)")
+                browser.until("proxarm.player.isShown(6000)", "that cycle")
+                browser.until("proxarm.felt.touched?.length > 100", "points")
+                slope, meant = browser.run("""
+                    const pressed = proxarm.felt.touched.filter(([depth]) => depth > 2);
+                    const layer = proxarm.stage.scene.objects.find((object) => object.layer).layer;
+                    return [pressed.reduce((sum, [d, f]) => sum + f / d, 0) / pressed.length, layer.stiffness / 1e3];""")
+                self.assertAlmostEqual(slope / meant, 1.0, delta=0.2)  # with friction, which is in the force as well
+                browser.run("document.getElementById('felt').scrollIntoView({ block: 'end' })")
+                time.sleep(0.5)
+                browser.picture("felt-light")
             self.assertEqual(browser.complaints(), [])
 
     def test_a_unit_may_be_typed(self):

@@ -1,6 +1,7 @@
 // Puts the page together: what comes from the session goes to the picture, the plots and the panel.
 import { Connection } from './connection.js';
 import { Control } from './control.js';
+import { Felt } from './felt.js';
 import { Keys } from './keys.js';
 import { Microscope } from './microscope.js';
 import { Panel } from './panel.js';
@@ -16,7 +17,7 @@ const plots = new Plots(element('plots'));
 const panel = new Panel();
 const microscope = new Microscope(element('microscope'));
 const keys = new Keys();
-let stage = null, built = false, newest = null, control = null, player = null;
+let stage = null, built = false, newest = null, control = null, player = null, felt = null;
 
 const connection = new Connection({
   stage: (value) => {
@@ -24,6 +25,7 @@ const connection = new Connection({
     built = false;
     panel.introduce(stage);
     plots.introduce(stage);
+    felt = new Felt(element('felt'), stage);
     document.body.dataset.mode = stage.mode;
     const chip = element('mode-chip');
     chip.hidden = false;
@@ -76,6 +78,7 @@ function frame(now) {
   world.tell(panel.told);
   world.draw();
   plots.draw(now);
+  felt?.draw(now, plots.rows);
 }
 requestAnimationFrame(frame);
 
@@ -112,4 +115,4 @@ keys.add('=', '', () => world.zoom(CLOSER));
 keys.add('-', 'further away', () => world.zoom(1 / CLOSER), '−');
 
 // For tests and for the curious.
-globalThis.proxarm = { world, plots, panel, microscope, connection, get control() { return control; }, get stage() { return stage; }, get player() { return player; } };
+globalThis.proxarm = { world, plots, panel, microscope, get felt() { return felt; }, connection, get control() { return control; }, get stage() { return stage; }, get player() { return player; } };

@@ -38,7 +38,7 @@ const SESSION_FIGURES = [
   ['tool to proxy', (m) => length(Math.hypot(m.tool_x - m.proxy_x, m.tool_y - m.proxy_y, m.tool_z - m.proxy_z))],
   ['mass felt, wanted', (m) => (m.mass_kg > 0 ? `${m.mass_kg.toFixed(2)} kg` : '—')],
   ['inertia felt', (m) => `${m.inertia_kg_m2.toPrecision(3)} kg m²`, turns],
-  ['over the smallest stable', (m) => overSmallest(marginAt(m)), (m) => Boolean(marginAt(m)) && m.mass_kg > 0],
+  ['smallest stable', (m) => overSmallest(marginAt(m)), (m) => Boolean(marginAt(m)) && m.mass_kg > 0],
   ['damping', (m) => `${m.damping_Ns_per_m.toFixed(1)} Ns/m`],
   ['timestep', (m) => `${(1e3 * m.period_s).toFixed(2)} ms`],
 ];
@@ -51,7 +51,7 @@ export function overSmallest(margin) {
   const { felt_mass_kg: felt, smallest_stable_mass_kg: smallest } = margin;
   if (smallest === null) return '! none is stable';
   const ratio = felt / smallest;
-  return `${ratio < 1 ? '! ' : ''}${ratio.toFixed(2)} (of ${smallest.toPrecision(2)} kg)`;
+  return `${ratio < 1 ? '! ' : ''}${smallest.toPrecision(2)} kg (${ratio.toFixed(2)} ×)`;
 }
 
 // Of the simulated arm alone.

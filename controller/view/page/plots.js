@@ -1,6 +1,7 @@
 // The last 20 s in four plots: forces, the way to the nearest surface, mass and energy, the cycle's computing time.
 // While something is touched the ground is shaded: plain where it sticks, hatched where it slips.
 import { PHASE_RENDERING } from './connection.js';
+import { evenForce } from './felt.js';
 import { colour, dash, onTheme } from './theme.js';
 
 const WINDOW_S = 20;
@@ -86,16 +87,18 @@ class FeltMass {
     this.forceTimesA *= keep;
     this.aTimesA *= keep;
     if (a.contact === 0 && c.contact === 0 && (this.anyMass || c.mass_kg > 0) && h1 > 0 && h2 > 0) {
-      for (const axis of ['x', 'y', 'z']) {
-        const p = `tool_${axis}`, f = `force_${axis}`;
+      const force = evenForce(this.rows);
+      ['x', 'y', 'z'].forEach((axis, k) => {
+        const p = `tool_${axis}`;
         const acceleration = 2 * ((c[p] - b[p]) / h2 - (b[p] - a[p]) / h1) / (h1 + h2);
-        const mean = this.rows.reduce((sum, row) => sum + row[f], 0) / this.rows.length;
-        this.forceTimesA += mean * acceleration;
+        this.forceTimesA += force[k] * acceleration;
         this.aTimesA += acceleration * acceleration;
-      }
+      });
     }
     const known = this.aTimesA > 0.5 && a.contact === 0 && c.contact === 0;
-    return known ? Math.min(200, Math.max(0, this.forceTimesA / this.aTimesA)) : NaN;
+    // The sensor doesn't see what moves the handle before it.
+    const handle_kg = this.anyMass ? 0 : c.handle_kg;
+    return known ? Math.min(200, Math.max(0, handle_kg + this.forceTimesA / this.aTimesA)) : NaN;
   }
 }
 

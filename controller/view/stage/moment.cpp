@@ -40,6 +40,7 @@ constexpr std::array fields{
     Field{
         "mass_kg",
         [](const Moment& m) { return m.record.proxy_mass_kg > 0.0 ? m.record.proxy_mass_kg + m.handle_mass_kg : 0.0; }},
+    Field{"handle_kg", [](const Moment& m) { return m.handle_mass_kg; }},
     Field{"inertia_kg_m2", [](const Moment& m) { return m.record.proxy_inertia_kg_m2; }},
     Field{"damping_Ns_per_m", [](const Moment& m) { return m.record.proxy_damping_Ns_per_m; }},
     Field{"energy_hand_J", [](const Moment& m) { return m.record.energies_J.hand; }},
