@@ -354,6 +354,7 @@ void tell_in_brief(const Summary& s, Lines& line) {
   if (s.oscillation && s.oscillation->duration_s > 0.0) tell_oscillation(s, line);
   if (s.poses && s.poses->unstable) line("not stable everywhere", poses_text(*s.poses->unstable), VerdictTone::look);
   if (s.hands_off_s > 0.0) line("hands off", hands_off(s));
+  if (s.view) line("view", view_text(s.view));
   tell_events(s, line);
   tell_faults(s, line);
 }
