@@ -329,6 +329,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_flag("--view-control", options.view_control,
                "the same, and let it be changed there, as `proxarm set` and `proxarm hold` do");
   app.add_flag("--json", options.json, "print the summary as one JSON object");
+  app.add_flag("--verbose", options.verbose, "print all figures, not the summary's eight lines");
   app.add_flag("--force-unstable", options.force_unstable,
                "simulation only: run with a mass that is predicted unstable");
 }

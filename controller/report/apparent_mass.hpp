@@ -19,6 +19,7 @@
 #include <complex>
 #include <cstddef>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "models/geometry/geometry.hpp"
@@ -106,5 +107,8 @@ class FeltMassCurve {
 
 // Up to which frequency, from the first point on, |M(f) − M|/M stays within `limit`; 0: not even there.
 double band_within_Hz(const std::vector<FeltMassCurve::Point>& curve, double mass_kg, double limit);
+// The limits that summaries name.
+inline constexpr std::array<std::pair<const char*, double>, 3> felt_limits{
+    {{"5 %", 0.05}, {"10 %", 0.1}, {"25 %", 0.25}}};
 
 }  // namespace proxarm::controller

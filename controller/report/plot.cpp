@@ -7,7 +7,8 @@
 #include <numbers>
 #include <sstream>
 
-#include "controller/report/gnuplot.hpp"
+#include "controller/drawing/gnuplot.hpp"
+#include "controller/drawing/palette.hpp"
 #include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::controller {
@@ -19,16 +20,8 @@ using models::Vec3;
 constexpr std::size_t most_samples = 4000;
 constexpr double nothing_rad = 1e-6;  // its axis is known to 1e-9
 
-// Colours of the browser's view (controller/view/page/style.css): --tool, --proxy, which is the contact's as well, and
-// --hand; --shade-stick and --shade-slip on white.
-constexpr const char* tool_colour = "#b35900";
-constexpr const char* proxy_colour = "#0072b2";
-constexpr const char* hand_colour = "#6b3fa0";
-constexpr const char* stick_ground = "#ddecf5";
-constexpr const char* slip_ground = "#f9e7d9";
-
 // Of the picture, in pixels.
-constexpr double head = 98.0, row_height = 236.0, between_rows = 21.0, foot = 108.0;
+constexpr double head = 112.0, row_height = 236.0, between_rows = 21.0, foot = 108.0;
 
 }  // namespace
 
@@ -68,6 +61,10 @@ PlotBuilder::PlotBuilder(std::string title, std::string gnuplot)
 
 void PlotBuilder::add(const CycleRecord& record) {
   if (record.phase != Phase::rendering) return;
+  if (vec3(record.contact_force_W_N).norm() > vec3(peak_.contact_force).norm()) {
+    peak_.time_s = 1e-9 * static_cast<double>(record.time_ns);
+    peak_.contact_force = record.contact_force_W_N;
+  }
   if (seen_++ % stride_ != 0) return;
   if (samples_.size() >= most_samples) {
     // Twice as coarse from here on, and back to the start.
@@ -228,27 +225,33 @@ PlotBuilder::Ranges PlotBuilder::ranges(const Axes& axes) const {
   return {without_peaks(forces, 1.0), without_peaks(torques, 0.01), std::clamp(1.3 * deepest_mm, 0.2, 20.0)};
 }
 
-std::string PlotBuilder::script(const Axes& axes) const {
+std::string PlotBuilder::script(const Axes& axes, const std::string& answer) const {
   std::ostringstream gp;
+  const std::string hand = css(on_white(colour("hand").light));
   const double from = samples_.front().time_s, to = std::max(samples_.back().time_s, from + 1e-3);
   gp << "set terminal svg size 1200," << height_px() << " font 'sans,21' background 'white' noenhanced\n"
      << "set output 'plot.svg'\nset encoding utf8\n"
-     << "set style line 1 lc rgb '" << tool_colour << "' lw 3.2\n"
-     << "set style line 2 lc rgb '" << proxy_colour << "' lw 1.8 dt (8,6)\n"
-     << "set style line 3 lc rgb '" << proxy_colour << "' lw 2.4 dt (10,5)\n"  // contact
-     << "set style line 4 lc rgb '#009e73' lw 2.8 dt (2,4)\n"                  // friction
-     << "set style line 5 lc rgb '" << hand_colour << "' lw 3.2\n"
-     << "set style line 6 lc rgb '" << hand_colour << "' lw 2.4 dt (10,5)\n"  // of a hand alone: y
-     << "set style line 7 lc rgb '" << hand_colour << "' lw 2.8 dt (2,4)\n"   // and z
+     << "set style line 1 " << gnuplot_line("tool") << " lw 3.2\nset style line 2 " << gnuplot_line("proxy")
+     << " lw 1.8\nset style line 3 " << gnuplot_line("contact") << " lw 2.4\nset style line 4 "
+     << gnuplot_line("friction") << " lw 2.8\nset style line 5 " << gnuplot_line("hand")
+     << " lw 3.2\n"
+     // Of a hand alone: y and z.
+     << "set style line 6 lc rgb '" << hand << "' lw 2.4 dt (10,5)\nset style line 7 lc rgb '" << hand
+     << "' lw 2.8 dt (2,4)\n"
      << "set xrange [" << from << ":" << to << "]\nset grid lc rgb '#b0b0b0' lw 0.6\n"
      << "set lmargin 11\nset rmargin 3\nset format x ''\n";
   const double top = 1.0 - 23.0 / height_px();
   const std::string labels = shade_contacts(gp, 0.04 * (to - from));
-  gp << "set multiplot\nset label 100000 " << gnuplot_string(title_) << " at screen 0.02, screen " << top << " left\n"
-     << labels << "set key at screen 0.97, screen " << top << " horizontal maxrows 1 samplen 3\n";
+  const double second = 1.0 - 56.0 / height_px();  // line
+  gp << "set multiplot\nset label 100000 " << gnuplot_string(answer.empty() ? title_ : answer)
+     << " at screen 0.02, screen " << top << " left font 'sans,23'\nset label 100001 "
+     << gnuplot_string(answer.empty() ? "" : title_) << " at screen 0.02, screen " << second
+     << " left font 'sans,19' textcolor rgb '" << colour("soft").light << "'\n"
+     << labels << "set key at screen 0.97, screen " << second << " horizontal maxrows 1 samplen 3\n";
   const Ranges range = ranges(axes);
   draw_positions(gp, axes.wall, range);
   if (turns_) draw_turn(gp, axes.turn, range.torque_Nm);
+  label_peak(gp, axes, range.force_N);
   draw_forces(gp, axes.wall, range);
   return gp.str();
 }
@@ -261,7 +264,8 @@ std::string PlotBuilder::shade_contacts(std::ostream& gp, double shortest_labell
     if (band.contact == ContactPhase::free) continue;
     const bool slip = band.contact == ContactPhase::slip;
     gp << "set object " << ++object << " rectangle from " << band.from_s << ", graph 0 to " << band.to_s
-       << ", graph 1 fillcolor rgb '" << (slip ? slip_ground : stick_ground) << "' fillstyle solid noborder behind\n";
+       << ", graph 1 fillcolor rgb '" << css(on_white(colour(slip ? "shade-slip" : "shade-stick").light))
+       << "' fillstyle solid noborder behind\n";
     if (band.to_s - band.from_s <= shortest_labelled_s) continue;
     labels << "set label " << object << " '" << contact_phase_name(band.contact) << "' at "
            << 0.5 * (band.from_s + band.to_s) << ", graph 1.07 center\n";
@@ -321,10 +325,21 @@ void PlotBuilder::draw_forces(std::ostream& gp, bool wall, const Ranges& range) 
      << names[2] << "'\nunset multiplot\n";
 }
 
-std::string PlotBuilder::write(const fs::path& svg) const {
+// The largest force, where it leaves the panel: an impact's is M v/T in a single cycle.
+void PlotBuilder::label_peak(std::ostream& gp, const Axes& axes, const Range& range) const {
+  const double peak_N = axes.directions[0].dot(vec3(peak_.contact_force));
+  if (!axes.wall || !(peak_N > range.high)) return;
+  const double middle_s = 0.5 * (samples_.front().time_s + samples_.back().time_s);
+  char text[40];
+  std::snprintf(text, sizeof text, peak_.time_s > middle_s ? "%.3g N ▲" : "▲ %.3g N", peak_N);
+  gp << "set label 2 '" << text << "' at " << peak_.time_s << ", graph 0.92 "
+     << (peak_.time_s > middle_s ? "right offset 0.5,0" : "left offset -0.5,0") << " front\n";
+}
+
+std::string PlotBuilder::write(const fs::path& svg, const std::string& answer) const {
   if (is_empty()) return "no plot: nothing was rendered";
   const Axes drawn = axes();
-  return draw_svg(gnuplot_, script(drawn), data(drawn), svg);
+  return draw_svg(gnuplot_, script(drawn, answer), data(drawn), svg);
 }
 
 }  // namespace proxarm::controller

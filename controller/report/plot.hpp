@@ -34,7 +34,8 @@ class PlotBuilder {
   // Nothing was rendered, so there is nothing to draw.
   [[nodiscard]] bool is_empty() const noexcept { return samples_.size() < 2; }
   // Writes the SVG. Returns a warning in one line where that didn't work; empty when it did.
-  [[nodiscard]] std::string write(const std::filesystem::path& svg) const;
+  // `answer`: one line above all, what the session comes to (plot_headline() of a summary).
+  [[nodiscard]] std::string write(const std::filesystem::path& svg, const std::string& answer = "") const;
 
  private:
   struct Sample {
@@ -56,7 +57,8 @@ class PlotBuilder {
   [[nodiscard]] std::string data(const Axes& axes) const;
   [[nodiscard]] static Range without_peaks(std::vector<double> values, double least);
   [[nodiscard]] Ranges ranges(const Axes& axes) const;
-  [[nodiscard]] std::string script(const Axes& axes) const;
+  [[nodiscard]] std::string script(const Axes& axes, const std::string& answer) const;
+  void label_peak(std::ostream& gp, const Axes& axes, const Range& range) const;
   std::string shade_contacts(std::ostream& gp, double shortest_labelled_s) const;
   void draw_positions(std::ostream& gp, bool wall, const Ranges& range) const;
   void draw_turn(std::ostream& gp, const models::Vec3& axis, const Range& torque_Nm) const;
@@ -67,6 +69,7 @@ class PlotBuilder {
 
   std::string title_, gnuplot_;
   std::vector<Sample> samples_;
+  Sample peak_{};  // of all cycles, the one with the largest force of contact
   std::uint64_t stride_ = 1, seen_ = 0;
   bool truth_ = false, turns_ = false;
 };

@@ -1,19 +1,14 @@
 #include "controller/report/progress.hpp"
 
 #include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
+
+#include "controller/report/terminal.hpp"
 
 namespace proxarm::controller {
 namespace {
-
-bool can_redraw(std::FILE* stream) {
-  const char* terminal = std::getenv("TERM");
-  return isatty(fileno(stream)) == 1 && terminal != nullptr && std::string_view(terminal) != "dumb";
-}
 
 std::size_t columns_of(std::FILE* stream) {
   winsize size{};

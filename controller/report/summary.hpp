@@ -49,6 +49,7 @@
 #include "controller/record/page_faults.hpp"
 #include "controller/report/apparent_mass.hpp"
 #include "controller/report/oscillation.hpp"
+#include "controller/stability/passed_poses.hpp"
 #include "controller/stability/verdict.hpp"
 #include "controller/supervision/fault.hpp"
 
@@ -149,6 +150,7 @@ struct PassivitySummary {
 struct PosesSummary {
   std::size_t judged = 0;
   std::optional<UnstablePlaces> unstable;  // times after the first cycle; absent: it was
+  std::vector<PassedPoses::Place> places;  // with the smallest stable mass, where that was looked for
 };
 // "at 3.2 s the arm came …".
 std::string poses_text(const UnstablePlaces& there);
@@ -237,7 +239,24 @@ std::string summary_json(const Summary& summary);
 // own.
 std::string repeatable_json(const Summary& summary);
 std::string timing_json(const Summary& summary);
-// For people: a table of some twenty lines.
-std::string summary_text(const Summary& summary);
+
+// What the session comes to, in one word for programs and one sentence for people.
+enum class VerdictTone { good, look, bad };
+struct SummaryVerdict {
+  VerdictTone tone = VerdictTone::good;
+  const char* word = "fine";  // fine, look, swings, fault: the first thing that a user has to know
+  std::string text;
+};
+SummaryVerdict judge(const Summary& summary);
+
+// One line above the picture of a session (plot.hpp): what was felt of what was wanted, and how true the touch was.
+std::string plot_headline(const Summary& summary);
+
+struct SummaryLook {
+  bool verbose = true;  // all figures: some twenty lines; else eight, and one for each thing that went wrong
+  bool colour = false;  // of the verdict and what went wrong, for terminals (terminal.hpp)
+};
+// For people: a table of names and values.
+std::string summary_text(const Summary& summary, const SummaryLook& look = {});
 
 }  // namespace proxarm::controller

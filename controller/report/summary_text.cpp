@@ -1,4 +1,4 @@
-// The summary for programs and for people.
+// The summary for people.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,218 +8,9 @@
 
 #include "controller/report/summary.hpp"
 #include "controller/stability/stability.hpp"
-#include "models/files/json.hpp"
 
 namespace proxarm::controller {
 namespace {
-
-using description::Json;
-
-Json faults(const Summary& summary) {
-  Json list = Json::array();
-  for (const FaultSummary& fault : summary.faults) {
-    list.push_back({{"fault", fault_name(fault.fault)},
-                    {"cycle", fault.cycle},
-                    {"text", fault.text},
-                    {"was_reset", fault.was_reset}});
-    if (fault.escalation != Fault::none) list.back()["escalation"] = fault_name(fault.escalation);
-  }
-  return list;
-}
-
-Json timesteps(const Summary& summary) {
-  Json list = Json::array();
-  for (const TimestepSummary& t : summary.timesteps) {
-    list.push_back({{"time_s", t.time_s},
-                    {"from_s", t.from_s},
-                    {"to_s", t.to_s},
-                    {"paused_s", t.paused_s},
-                    {"refused", t.refused}});
-  }
-  return list;
-}
-
-Json idle_orders(const Summary& summary) {
-  Json list = Json::array();
-  for (const OrderSummary& order : summary.idle_orders) {
-    list.push_back({{"order", order.order}, {"time_s", order.time_s}, {"refused", order.refused}});
-  }
-  return list;
-}
-
-void add_timing(Json& json, const Summary& s) {
-  json["wall_time_s"] = s.wall_time_s;
-  json["overruns"] = s.overruns;
-  json["figures_s"] = s.figures_s;
-  json["compute_us"] = {{"median", s.compute_us.median},
-                        {"p99", s.compute_us.p99},
-                        {"max", s.compute_us.max},
-                        {"total", s.compute_us.total}};
-  for (const auto& [name, latency] : s.latency_us) {
-    json["latency_us"][name] = {{"median", latency.median},
-                                {"p99", latency.p99},
-                                {"p999", latency.p999},
-                                {"max", latency.max},
-                                {"histogram", latency.histogram}};
-  }
-  if (s.page_faults) json["page_faults"] = {{"minor", s.page_faults->minor}, {"major", s.page_faults->major}};
-}
-
-Json oscillation(const std::optional<Oscillation>& summary) {
-  if (!summary) return nullptr;
-  return {{"from_s", summary->from_s},
-          {"duration_s", summary->duration_s},
-          {"frequency_Hz", summary->frequency_Hz},
-          {"amplitude_m", summary->amplitude_m},
-          {"amplitude_rad", summary->amplitude_rad ? Json(*summary->amplitude_rad) : Json(nullptr)},
-          {"lasts", summary->lasts}};
-}
-
-Json passivity(const std::optional<PassivitySummary>& summary) {
-  if (!summary) return nullptr;
-  const PortEnergies& e = summary->energies_J;
-  return {{"hand_J", e.hand},
-          {"proxy_J", e.proxy},
-          {"world_J", e.world},
-          {"kinetic_J", e.kinetic},
-          {"damping_J", e.damping},
-          {"added_damping_J", e.added},
-          {"oscillating_time_s", summary->oscillating_time_s},
-          {"oscillation_max_m_per_s", summary->oscillation_max_m_per_s},
-          {"added_time_s", summary->added_time_s},
-          {"added_damping_max_Ns_per_m", summary->added_damping_max_Ns_per_m},
-          {"felt_damping_min_Ns_per_m", summary->felt_damping_min_Ns_per_m}};
-}
-
-Json poses(const std::optional<PosesSummary>& summary) {
-  if (!summary) return nullptr;
-  Json json{{"judged", summary->judged}, {"unstable", nullptr}};
-  if (!summary->unstable) return json;
-  const UnstablePlaces& there = *summary->unstable;
-  const auto smallest = [&](bool is_lacking) { return is_lacking ? there.smallest_stable : std::nullopt; };
-  json["unstable"] = {{"first_s", there.first_s},
-                      {"worst_s", there.worst_s},
-                      {"felt_mass_kg", there.felt_mass_kg},
-                      {"felt_inertia_kg_m2", nullptr},
-                      {"lacks", there.lacks_mass ? "mass" : "inertia"},
-                      {"smallest_stable_mass_kg", smallest(there.lacks_mass)},
-                      {"smallest_stable_inertia_kg_m2", smallest(!there.lacks_mass)}};
-  if (there.felt_inertia_kg_m2 > 0.0) json["unstable"]["felt_inertia_kg_m2"] = there.felt_inertia_kg_m2;
-  return json;
-}
-
-Json view(const std::optional<ViewSummary>& summary) {
-  if (!summary) return nullptr;
-  return {{"address", "127.0.0.1"},
-          {"port", summary->port},
-          {"most_viewers", summary->most_viewers},
-          {"may_change", summary->may_change}};
-}
-
-// By frequency: Re and phase of F/a, and |F/a − M|/M.
-Json felt_mass(const Summary& s) {
-  Json list = Json::array();
-  if (!(s.wanted_mass_kg > 0.0)) return list;
-  for (const FeltMassCurve::Point& point : s.felt_mass) {
-    list.push_back({{"frequency_Hz", point.frequency_Hz},
-                    {"mass_kg", point.mass_kg.real()},
-                    {"phase_deg", 180.0 / std::numbers::pi * std::arg(point.mass_kg)},
-                    {"error", std::abs(point.mass_kg - s.wanted_mass_kg) / s.wanted_mass_kg}});
-  }
-  return list;
-}
-
-constexpr std::array<std::pair<const char*, double>, 3> felt_limits{{{"5 %", 0.05}, {"10 %", 0.1}, {"25 %", 0.25}}};
-
-constexpr std::array space_axes{"x", "y", "z"};
-
-Json felt_bands(const std::vector<FeltMassCurve::Point>& felt_mass, double wanted_kg) {
-  if (felt_mass.empty() || !(wanted_kg > 0.0)) return nullptr;
-  Json bands;
-  for (const auto& [name, limit] : felt_limits) bands[name] = band_within_Hz(felt_mass, wanted_kg, limit);
-  return bands;
-}
-
-Json felt_bands_along(const Summary& s) {
-  Json along;
-  for (std::size_t axis = 0; axis < space_axes.size(); ++axis) {
-    along[space_axes[axis]] = felt_bands(s.felt_mass_along[axis], s.wanted_mass_kg);
-  }
-  return along;
-}
-
-void add_repeatable(Json& json, const Summary& s) {
-  json["bus_load"] = Json::object();
-  for (const auto& [bus, load] : s.bus_load) json["bus_load"][bus] = load;
-  json["first_cycle_s"] = s.first_cycle_s;
-  json["rendering_from_s"] = s.rendering_from_s;
-  json["proxy_clearance_min_m"] = s.proxy_clearance_min_m;
-  json["penetration_max_m"] = s.penetration_max_m;
-  json["tool_penetration_max_m"] = s.tool_penetration_max_m;
-  json["tool_penetration_touch_max_m"] = s.tool_penetration_touch_max_m;
-  json["tool_penetration_sliding_max_m"] = s.tool_penetration_sliding_max_m;
-  json["tracking_rms_m"] = s.tracking_rms_m;
-  json["tracking_max_m"] = s.tracking_max_m;
-  json["tracking_lag_rms_m"] = s.tracking_lag_rms_m;
-  json["tracking_lag_max_m"] = s.tracking_lag_max_m;
-  json["wanted_mass_kg"] = s.wanted_mass_kg > 0.0 ? Json(s.wanted_mass_kg) : Json(nullptr);
-  json["apparent_mass_kg"] = s.apparent_mass_kg;
-  json["apparent_damping_Ns_per_m"] = s.apparent_damping_Ns_per_m;
-  json["felt_mass"] = felt_mass(s);
-  json["felt_mass_band_Hz"] = felt_bands(s.felt_mass, s.wanted_mass_kg);
-  json["felt_mass_band_Hz_along"] = felt_bands_along(s);
-  json["unresolved_steps"] = s.unresolved_steps;
-  json["wanted_inertia_kg_m2"] = s.wanted_inertia_kg_m2 > 0.0 ? Json(s.wanted_inertia_kg_m2) : Json(nullptr);
-  json["apparent_inertia_kg_m2"] = s.apparent_inertia_kg_m2;
-  json["apparent_turning_damping_Nms_per_rad"] = s.apparent_turning_damping_Nms_per_rad;
-  json["contact_force_error_N"] = s.contact_force_error_N;
-  json["contact_force_error_max_N"] = s.contact_force_error_max_N;
-  json["friction_ratio_error"] = s.friction_ratio_error;
-  json["pulling_force_max_N"] = s.pulling_force_max_N;
-  json["drag_force_max_N"] = s.drag_force_max_N;
-  json["rendered_time_s"] = s.rendered_time_s;
-  json["contact_time_s"] = s.contact_time_s;
-  json["sliding_time_s"] = s.sliding_time_s;
-  json["contacts"] = s.contacts;
-  json["limited_cycles"] = s.limited_cycles;
-  json["active_limits"] = Json::object();
-  json["limits"] = Json::array();
-  for (const auto& [parameter, limit] : s.active_limits) {
-    json["active_limits"][parameter] = limit.cycles;
-    json["limits"].push_back({{"limit", parameter},
-                              {"what", limit.words},
-                              {"first_s", limit.first_s},
-                              {"time_s", limit.time_s},
-                              {"cycles", limit.cycles}});
-  }
-  json["lookahead_s"] = s.lookahead_s;
-  json["oscillation"] = oscillation(s.oscillation);
-  json["expected_swing"] = nullptr;
-  if (s.expected_swing) {
-    json["expected_swing"] = {{"frequency_Hz", s.expected_swing->frequency_Hz}, {"tenth_s", s.expected_swing->tenth_s}};
-  }
-  json["poses"] = poses(s.poses);
-  json["passivity"] = passivity(s.passivity);
-  json["hands_off_s"] = s.hands_off_s;
-  json["guarded_cycles"] = s.guarded_cycles;
-  json["limits_work_J"] = s.limits_work_J;
-  json["limits_push_J"] = s.limits_push_J;
-  json["held_samples"] = s.held_samples;
-  json["source"] = s.from_truth ? "simulation" : "sensor and encoders";
-  json["end"] = {{"reason", s.end.reason}, {"text", s.end.text}};
-  json["idle_orders"] = idle_orders(s);
-  json["drives_lack"] = s.drives_lack;
-  json["faults"] = faults(s);
-  json["notices"] = Json::array();
-  for (const NoticeSummary& notice : s.notices) {
-    json["notices"].push_back({{"fault", fault_name(notice.fault)},
-                               {"reaction", reaction_name(notice.reaction)},
-                               {"times", notice.times},
-                               {"cycles", notice.cycles}});
-  }
-  json["timesteps"] = timesteps(s);
-  json["setpoint_sha256"] = s.setpoint_sha256;
-}
 
 std::string format(const char* pattern, double value) {
   char text[64];
@@ -254,36 +45,19 @@ std::string refusal_text(const fieldbus::PeriodRefusal& refusal, const std::vect
          (refusal.code != 0 ? fieldbus::describe_sdo_abort(refusal.code) : "it kept another value");
 }
 
-std::string summary_json(const Summary& s) {
-  Json json;
-  json["simulated_time_s"] = s.simulated_time_s;
-  json["cycles"] = s.cycles;
-  add_timing(json, s);
-  add_repeatable(json, s);
-  if (!s.black_box.empty()) json["black_box"] = s.black_box;
-  json["view"] = view(s.view);
-  return json.dump();
-}
-
-std::string repeatable_json(const Summary& s) {
-  Json json;
-  json["simulated_time_s"] = s.simulated_time_s;
-  json["cycles"] = s.cycles;
-  add_repeatable(json, s);
-  return json.dump(2) + "\n";
-}
-
-std::string timing_json(const Summary& s) {
-  Json json;
-  add_timing(json, s);
-  return json.dump(2) + "\n";
-}
-
 namespace {
+
+constexpr std::array axis_letters{"x", "y", "z"};
+
+constexpr const char* sgr_of(VerdictTone tone) {  // ECMA-48, select graphic rendition
+  return tone == VerdictTone::good ? "\x1b[32m" : tone == VerdictTone::look ? "\x1b[33m" : "\x1b[1;31m";
+}
 
 // The summary's lines: names on the left, in a column of their own.
 class Lines {
  public:
+  explicit Lines(bool colour) : colour_(colour) {}
+
   void operator()(const char* name, const std::string& value) {
     text_ += "  ";
     text_ += name;
@@ -292,10 +66,14 @@ class Lines {
     text_.append(width < 26 ? 26 - width : 1, ' ');
     text_ += value + "\n";
   }
+  void operator()(const char* name, const std::string& value, VerdictTone tone) {
+    (*this)(name, colour_ ? sgr_of(tone) + value + "\x1b[0m" : value);
+  }
   [[nodiscard]] const std::string& text() const noexcept { return text_; }
 
  private:
   std::string text_;
+  bool colour_;
 };
 
 // What it took: time, processor, buses.
@@ -304,10 +82,10 @@ void tell_time(const Summary& s, Lines& line) {
                    format("%.3f s of it rendered; ", s.rendered_time_s) + format("wall clock %.2f s: ", s.wall_time_s) +
                    format("%.2f s for cycles, ", 1e-6 * s.compute_us.total) +
                    format("%.2f s for records and figures", s.figures_s));
-  line("compute per cycle",
-       format("median %.1f, ", s.compute_us.median) + format("p99 %.1f, ", s.compute_us.p99) +
-           format("max %.1f µs; ", s.compute_us.max) +
-           (s.virtual_time ? "virtual time waits for them" : "overruns " + std::to_string(s.overruns)));
+  line("compute per cycle", format("median %.1f, ", s.compute_us.median) + format("p99 %.1f, ", s.compute_us.p99) +
+                                format("max %.1f µs; ", s.compute_us.max) +
+                                (s.virtual_time ? "no deadline: simulated time stands still meanwhile"
+                                                : "overruns " + std::to_string(s.overruns)));
   for (const auto& [name, latency] : s.latency_us) {
     std::string words = name;
     std::replace(words.begin(), words.end(), '_', ' ');
@@ -324,15 +102,14 @@ void tell_time(const Summary& s, Lines& line) {
   if (!loads.empty()) line("bus load", loads);
 }
 
-// Up to which frequency the mass is what it should be, and what it is where that is worst.
 // Up to which frequency the mass is right along each axis that the tool was moved along, the worst axis first.
 std::string felt_along(const Summary& s) {
-  const auto& [name, limit] = felt_limits[1];
+  const auto& [name, limit] = felt_limits[1];  // 10 %
   std::vector<std::pair<double, const char*>> along;
-  for (std::size_t axis = 0; axis < space_axes.size(); ++axis) {
+  for (std::size_t axis = 0; axis < axis_letters.size(); ++axis) {
     const std::vector<FeltMassCurve::Point>& felt_mass = s.felt_mass_along[axis];
     if (felt_mass.empty()) continue;
-    along.emplace_back(band_within_Hz(felt_mass, s.wanted_mass_kg, limit), space_axes[axis]);
+    along.emplace_back(band_within_Hz(felt_mass, s.wanted_mass_kg, limit), axis_letters[axis]);
   }
   std::sort(along.begin(), along.end());
   std::string text;
@@ -343,6 +120,13 @@ std::string felt_along(const Summary& s) {
   return text;
 }
 
+std::string felt_band(const Summary& s) {
+  const auto& [name, limit] = felt_limits[1];
+  const double band_Hz = band_within_Hz(s.felt_mass, s.wanted_mass_kg, limit);
+  return "within " + std::string(name) + (band_Hz > 0.0 ? format(" up to %.2g Hz", band_Hz) : " nowhere");
+}
+
+// Up to which frequency the mass is what it should be, and what it is where that is worst.
 void tell_felt_mass(const Summary& s, Lines& line) {
   if (s.felt_mass.empty() || !(s.wanted_mass_kg > 0.0)) return;
   std::string bands;
@@ -361,39 +145,55 @@ void tell_felt_mass(const Summary& s, Lines& line) {
 // Below, a world's force is rounding.
 constexpr double noticeable_N = 1e-3;
 
+std::string apparent_mass(const Summary& s) {
+  return number(s.apparent_mass_kg, "%.3f kg") +
+         (s.wanted_mass_kg > 0.0 ? format(", wanted %.3f kg", s.wanted_mass_kg) : ", the device's own");
+}
+
+// Below 0 it isn't damping: a delay between push and motion hands out a little energy in each swing.
+std::string drag(const std::optional<double>& damping, const char* unit, const char* pattern) {
+  if (!damping) return "";
+  if (*damping >= 0.0) return "; damping " + format(pattern, *damping) + unit;
+  return "; the loop's delay pushes on by " + format(pattern, -*damping) + unit;
+}
+
+void tell_inertia(const Summary& s, Lines& line) {
+  if (!(s.wanted_inertia_kg_m2 > 0.0)) return;
+  line("apparent inertia", number(s.apparent_inertia_kg_m2, "%.5f kg m²") +
+                               format(", wanted %.5f kg m²", s.wanted_inertia_kg_m2) +
+                               drag(s.apparent_turning_damping_Nms_per_rad, "Nms/rad", "%.3f "));
+}
+
+std::string touched(const Summary& s) {
+  if (s.contacts > 0) {
+    return std::to_string(s.contacts) + (s.contacts == 1 ? " touch, " : " touches, ") +
+           format("%.2f s, ", s.contact_time_s) + format("%.2f s of it sliding", s.sliding_time_s);
+  }
+  return s.proxy_clearance_min_m ? "none; the nearest surface was " + length(s.proxy_clearance_min_m) + " away"
+                                 : "none";
+}
+
+void tell_unresolved(const Summary& s, Lines& line) {
+  if (s.unresolved_steps == 0) return;
+  line("unresolved",
+       std::to_string(s.unresolved_steps) + (s.unresolved_steps == 1 ? " step that keeps" : " steps that keep") +
+           " not all laws of contact",
+       VerdictTone::look);
+}
+
 // What was felt, and how true it was.
 void tell_motion(const Summary& s, Lines& line) {
-  line("apparent mass",
-       number(s.apparent_mass_kg, "%.3f kg") +
-           (s.wanted_mass_kg > 0.0 ? format(", wanted %.3f kg", s.wanted_mass_kg) : ", the device's own") +
-           (s.apparent_damping_Ns_per_m ? format("; damping %.2f Ns/m", *s.apparent_damping_Ns_per_m) : "") +
-           (s.limited_cycles > 0 ? "; where no limit acts" : ""));
-  if (s.wanted_inertia_kg_m2 > 0.0) {
-    line("apparent inertia", number(s.apparent_inertia_kg_m2, "%.5f kg m²") +
-                                 format(", wanted %.5f kg m²", s.wanted_inertia_kg_m2) +
-                                 (s.apparent_turning_damping_Nms_per_rad
-                                      ? format("; damping %.3f Nms/rad", *s.apparent_turning_damping_Nms_per_rad)
-                                      : ""));
-  }
+  line("apparent mass", apparent_mass(s) + drag(s.apparent_damping_Ns_per_m, "Ns/m", "%.2f ") +
+                            (s.limited_cycles > 0 ? "; where no limit acts" : ""));
+  tell_inertia(s, line);
   if (s.lookahead_s > 0.0)
     line("lookahead", format("%.3g ms: the arm is sent to where the proxy will be", 1e3 * s.lookahead_s));
   tell_felt_mass(s, line);
   line("tracking error", "rms " + length(s.tracking_rms_m) + ", max " + length(s.tracking_max_m) +
                              format("; with the lag of %.3g ms: rms ", 1e3 * s.tracking_delay_s) +
                              length(s.tracking_lag_rms_m) + ", max " + length(s.tracking_lag_max_m));
-  if (s.contacts == 0) {
-    line("contact", s.proxy_clearance_min_m
-                        ? "none; the nearest surface was " + length(s.proxy_clearance_min_m) + " away"
-                        : "none");
-  } else {
-    line("contact", std::to_string(s.contacts) + (s.contacts == 1 ? " touch, " : " touches, ") +
-                        format("%.2f s, ", s.contact_time_s) + format("%.2f s of it sliding", s.sliding_time_s));
-  }
-  if (s.unresolved_steps > 0) {
-    line("unresolved", std::to_string(s.unresolved_steps) +
-                           (s.unresolved_steps == 1 ? " step that keeps" : " steps that keep") +
-                           " not all laws of contact");
-  }
+  line("contact", touched(s));
+  tell_unresolved(s, line);
   line("penetration, proxy", length(s.penetration_max_m));
   line("penetration, tool", length(s.tool_penetration_max_m) + "; at the touch " +
                                 length(s.tool_penetration_touch_max_m) + ", sliding " +
@@ -428,15 +228,36 @@ std::string poses_text(const UnstablePlaces& there) {
 
 namespace {
 
+// Weber fraction of a mass that is moved by hand: below, hardly anybody notices (docs/view.md cites the sources).
+constexpr double noticeable_mass_share = 0.1;
+
+std::string hands_off(const Summary& s) {
+  return format("%.3g s: nobody at the handle, the arm stands", s.hands_off_s);
+}
+
 // Whether the loop was stable with this hand.
 void tell_oscillation(const Summary& s, Lines& line) {
   if (!s.oscillation) return;
   if (s.oscillation->duration_s == 0.0) return line("oscillation", "none");
-  line(s.oscillation->lasts ? "OSCILLATION" : "oscillation", oscillation_text(*s.oscillation));
-  if (!s.oscillation->lasts) return;
+  if (!s.oscillation->lasts) return line("oscillation", oscillation_text(*s.oscillation), VerdictTone::look);
+  line("OSCILLATION", oscillation_text(*s.oscillation), VerdictTone::bad);
   const char* larger = s.oscillation->amplitude_rad ? "mass, inertia or damping" : "mass or damping";
   line("", std::string("the loop isn't stable with this hand and arm: a larger ") + larger + ", a shorter timestep,");
   line("", "a longer setpoint filter; `proxarm tune` says which mass, and `damping added` what --passivity did");
+}
+
+// The longest first, each with its time.
+std::string limits_in_brief(const Summary& s) {
+  if (s.active_limits.empty()) return "none";
+  std::vector<std::pair<double, const std::string*>> longest;
+  for (const auto& [parameter, limit] : s.active_limits) longest.emplace_back(limit.time_s, &parameter);
+  std::sort(longest.begin(), longest.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  constexpr std::size_t most = 3;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(most, longest.size()); ++i) {
+    text += (i == 0 ? "" : ", ") + *longest[i].second + format(" for %.3g s", longest[i].first);
+  }
+  return longest.size() <= most ? text : text + " and " + std::to_string(longest.size() - most) + " more";
 }
 
 // What kept the motion back, and the energy that went through it.
@@ -467,38 +288,139 @@ std::string view_text(const std::optional<ViewSummary>& view) {
 void tell_events(const Summary& s, Lines& line) {
   for (const NoticeSummary& notice : s.notices) {
     const std::string times = notice.times == 1 ? "once" : std::to_string(notice.times) + " times";
-    line("noticed", fault_name(notice.fault) + (" " + times) + ", " + std::to_string(notice.cycles) +
-                        " cycles; reaction: " + reaction_name(notice.reaction));
+    line("noticed",
+         fault_name(notice.fault) + (" " + times) + ", " + std::to_string(notice.cycles) +
+             " cycles; reaction: " + reaction_name(notice.reaction),
+         VerdictTone::look);
   }
   for (const TimestepSummary& t : s.timesteps) {
     line("timestep", format("%.4g to ", 1e3 * t.from_s) + format("%.4g ms ", 1e3 * t.to_s) +
                          format("at %.3f s, ", t.time_s) + format("%.0f ms without rendering", 1e3 * t.paused_s) +
                          (t.refused.empty() ? "" : "; not taken: " + t.refused));
   }
-  for (const std::string& lack : s.drives_lack) line("lacking", lack);
+  for (const std::string& lack : s.drives_lack) line("lacking", lack, VerdictTone::look);
   for (const OrderSummary& order : s.idle_orders) {
-    line("order without effect", order.order + format(" at %.4g s: ", order.time_s) + order.refused);
+    line("order without effect", order.order + format(" at %.4g s: ", order.time_s) + order.refused, VerdictTone::look);
   }
-  if (!s.end.text.empty()) line("ended", s.end.text);
-  if (s.faults.empty()) line("faults", "none");
-  for (const FaultSummary& fault : s.faults) line(fault.was_reset ? "fault, then reset" : "FAULT", fault.text);
 }
 
-}  // namespace
+void tell_faults(const Summary& s, Lines& line) {
+  if (s.faults.empty()) line("faults", "none");
+  for (const FaultSummary& fault : s.faults) {
+    line(fault.was_reset ? "fault, then reset" : "FAULT", fault.text,
+         fault.was_reset ? VerdictTone::look : VerdictTone::bad);
+  }
+}
 
-std::string summary_text(const Summary& s) {
-  Lines line;
+// What a reader should know of a session without a fault, most pressing first.
+std::string remarks(const Summary& s) {
+  std::string text;
+  const auto add = [&text](bool is_so, const std::string& words) {
+    if (is_so) text += (text.empty() ? "" : "; ") + words;
+  };
+  add(s.poses && s.poses->unstable, "not stable everywhere");
+  add(s.oscillation && s.oscillation->duration_s > 0.0, "it swung and came to rest");
+  add(!s.virtual_time && s.overruns > 0,
+      std::to_string(s.overruns) + (s.overruns == 1 ? " cycle" : " cycles") + " late");
+  const double off = s.apparent_mass_kg && s.wanted_mass_kg > 0.0 ? *s.apparent_mass_kg / s.wanted_mass_kg - 1.0 : 0.0;
+  add(std::abs(off) > noticeable_mass_share,
+      format("the mass felt is %.0f %% ", 100.0 * std::abs(off)) + (off > 0.0 ? "above" : "below") + " the one wanted");
+  add(!s.faults.empty(), s.faults.size() == 1 ? "a fault was reset" : "faults were reset");
+  add(!s.notices.empty(), "something was noticed");
+  add(!s.idle_orders.empty(), "an order had no effect");
+  add(s.unresolved_steps > 0, "steps stayed unresolved");
+  return text;
+}
+
+// What happened, felt, touched; how true; limits, faults, verdict. What turns and whatever went wrong have lines of
+// their own.
+void tell_in_brief(const Summary& s, Lines& line) {
+  line("ended", s.end.text.empty() ? format("%.3f s were rendered", s.rendered_time_s) : s.end.text);
+  line("apparent mass",
+       apparent_mass(s) + (s.felt_mass.empty() || !(s.wanted_mass_kg > 0.0) ? "" : "; " + felt_band(s)));
+  tell_inertia(s, line);
+  line("contact", touched(s));
+  if (s.contacts > 0) {
+    line("accuracy",
+         "tool at most " + length(s.tool_penetration_max_m) + " inside" +
+             (s.contact_force_error_N ? format("; force within %.3f N rms", *s.contact_force_error_N) : "") +
+             (s.friction_ratio_error ? format("; friction %+.2f %%", 100 * *s.friction_ratio_error) : ""));
+  } else {
+    line("accuracy", "tool follows the proxy within " + length(s.tracking_rms_m) + " rms, " + length(s.tracking_max_m) +
+                         " at most");
+  }
+  line("limits active", limits_in_brief(s));
+  tell_unresolved(s, line);
+  if (s.oscillation && s.oscillation->duration_s > 0.0) tell_oscillation(s, line);
+  if (s.poses && s.poses->unstable) line("not stable everywhere", poses_text(*s.poses->unstable), VerdictTone::look);
+  if (s.hands_off_s > 0.0) line("hands off", hands_off(s));
+  if (s.view) line("view", view_text(s.view));
+  tell_events(s, line);
+  tell_faults(s, line);
+}
+
+// Where the mass felt was nearest to the smallest that is stable; nothing where that wasn't looked for.
+void tell_margin(const Summary& s, Lines& line) {
+  const auto share = [](const PassedPoses::Place& place) {
+    return place.smallest_stable_mass_kg ? place.felt_mass_kg / *place.smallest_stable_mass_kg : 0.0;
+  };
+  if (!s.poses || s.poses->places.empty()) return;
+  const auto nearest = std::ranges::min_element(s.poses->places, {}, share);
+  line("over smallest stable", format("%.2f times at least, ", share(*nearest)) + format("at %.2f s", nearest->time_s));
+}
+
+void tell_everything(const Summary& s, Lines& line) {
   tell_time(s, line);
   tell_motion(s, line);
   tell_oscillation(s, line);
-  if (s.poses && s.poses->unstable) line("not stable everywhere", poses_text(*s.poses->unstable));
+  tell_margin(s, line);
+  if (s.poses && s.poses->unstable) line("not stable everywhere", poses_text(*s.poses->unstable), VerdictTone::look);
   tell_limits(s, line);
-  if (s.hands_off_s > 0.0) line("hands off", format("%.3g s: nobody at the handle, the arm stands", s.hands_off_s));
+  if (s.hands_off_s > 0.0) line("hands off", hands_off(s));
   if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
   line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
   line("setpoints (SHA-256)", s.setpoint_sha256);
   line("view", view_text(s.view));
   tell_events(s, line);
+  if (!s.end.text.empty()) line("ended", s.end.text);
+  tell_faults(s, line);
+}
+
+}  // namespace
+
+SummaryVerdict judge(const Summary& s) {
+  if (!s.faults.empty() && !s.faults.back().was_reset) {
+    return {VerdictTone::bad, "fault", std::string("a fault ended it: ") + fault_name(s.faults.back().fault)};
+  }
+  if (s.oscillation && s.oscillation->lasts) {
+    return {VerdictTone::bad, "swings", "it swings by itself: not stable with this hand and arm"};
+  }
+  if (const std::string text = remarks(s); !text.empty()) return {VerdictTone::look, "look", "no fault, but " + text};
+  return {VerdictTone::good, "fine", "fine: no fault, nothing swung"};
+}
+
+std::string plot_headline(const Summary& s) {
+  const SummaryVerdict verdict = judge(s);
+  if (verdict.tone == VerdictTone::bad) return verdict.text;
+  std::string text;
+  if (s.apparent_mass_kg && s.wanted_mass_kg > 0.0) {
+    text = format("%.3g kg felt ", *s.apparent_mass_kg) + format("of %.3g kg wanted", s.wanted_mass_kg);
+  }
+  if (s.contacts == 0) return text + (text.empty() ? "nothing was touched" : "; nothing was touched");
+  text += (text.empty() ? "tool within " : "; tool within ") + length(s.tool_penetration_max_m) + " of what it touches";
+  if (s.contact_force_error_N) text += format(", its force within %.2g N", *s.contact_force_error_N);
+  return text;
+}
+
+std::string summary_text(const Summary& s, const SummaryLook& look) {
+  Lines line(look.colour);
+  if (look.verbose) {
+    tell_everything(s, line);
+  } else {
+    tell_in_brief(s, line);
+  }
+  const SummaryVerdict verdict = judge(s);
+  line("verdict", verdict.text, verdict.tone);
   return line.text();
 }
 

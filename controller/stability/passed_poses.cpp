@@ -51,7 +51,9 @@ std::optional<UnstablePlaces> PassedPoses::judge(const Asked& asked) {
   ++judged_;
   if (asked.felt.mass_kg != told_felt_.mass_kg || asked.felt.inertia_kg_m2 != told_felt_.inertia_kg_m2) told_.reset();
   told_felt_ = asked.felt;
-  std::optional<UnstablePlaces> there = unstable_at(asked);
+  const LoopModel loop = loop_at(asked);
+  if (finds_smallest_) found_.push_back({asked.time_s, asked.felt.mass_kg, smallest_mass(loop)});
+  std::optional<UnstablePlaces> there = unstable_at(asked, loop);
   if (!there) return {};
   there->first_s = there->worst_s = asked.time_s;
   add(*there, unstable_);
@@ -60,16 +62,26 @@ std::optional<UnstablePlaces> PassedPoses::judge(const Asked& asked) {
   return told_;
 }
 
-std::optional<UnstablePlaces> PassedPoses::unstable_at(const Asked& asked) const {
-  UnstablePlaces there;
-  const double mass_kg = there.felt_mass_kg = asked.felt.mass_kg;
-  const double inertia_kg_m2 = there.felt_inertia_kg_m2 = asked.felt.inertia_kg_m2;
+LoopModel PassedPoses::loop_at(const Asked& asked) const {
   LoopModel loop = asked.loop;
   loop.damping_Ns_per_m = asked.felt.damping_Ns_per_m;
   loop.arms = std::make_shared<const std::vector<ElasticArm>>(1, elastic_arm(arm_, asked.joints_rad, cell_));
+  return loop;
+}
+
+// Felt: with what hangs behind the sensor.
+std::optional<double> PassedPoses::smallest_mass(const LoopModel& loop) const {
+  std::optional<double> smallest = smallest_stable_mass(hand_, loop);
+  if (smallest) *smallest += loop.handle_mass_kg;
+  return smallest;
+}
+
+std::optional<UnstablePlaces> PassedPoses::unstable_at(const Asked& asked, const LoopModel& loop) const {
+  UnstablePlaces there;
+  const double mass_kg = there.felt_mass_kg = asked.felt.mass_kg;
+  const double inertia_kg_m2 = there.felt_inertia_kg_m2 = asked.felt.inertia_kg_m2;
   if (!(spectral_radius(hand_, loop, mass_kg - loop.handle_mass_kg) < 1.0)) {
-    there.smallest_stable = smallest_stable_mass(hand_, loop);
-    if (there.smallest_stable) *there.smallest_stable += loop.handle_mass_kg;
+    there.smallest_stable = smallest_mass(loop);
     return there;
   }
   if (!turned_ || !(inertia_kg_m2 > 0.0)) return {};

@@ -39,6 +39,12 @@ class PassedPoses {
     models::JointVector joints_rad;  // of the links
   };
 
+  // How far from swinging it was there.
+  struct Place {
+    double time_s = 0.0, felt_mass_kg = 0.0;
+    std::optional<double> smallest_stable_mass_kg;  // felt; absent: none is
+  };
+
   // `loop`: without arms. `turned`, as pose_loop_at() takes it: of a tool that is led and turned at once; its loop is
   // `loop`. The arm and the cell must outlive it.
   PassedPoses(const models::Arm& arm, const description::Cell& cell, const HandModel& hand, const LoopModel& loop,
@@ -59,13 +65,21 @@ class PassedPoses {
   // that thread's as well.
   std::optional<UnstablePlaces> judge(const Asked& asked);
 
+  // From now on the smallest stable mass is looked for in stable places, too: ten times the work of judging one. The
+  // mass alone: turning isn't in it.
+  void find_smallest() noexcept { finds_smallest_ = true; }
+  // Those places, in the order in which they were judged.
+  [[nodiscard]] const std::vector<Place>& places() const noexcept { return found_; }
+
   [[nodiscard]] std::size_t judged() const noexcept { return judged_; }
   // Of all that was felt.
   [[nodiscard]] const std::optional<UnstablePlaces>& unstable() const noexcept { return unstable_; }
 
  private:
   bool is_new(const models::ToolPose& tool_W, const Felt& felt);
-  [[nodiscard]] std::optional<UnstablePlaces> unstable_at(const Asked& asked) const;
+  [[nodiscard]] LoopModel loop_at(const Asked& asked) const;
+  [[nodiscard]] std::optional<double> smallest_mass(const LoopModel& loop) const;
+  [[nodiscard]] std::optional<UnstablePlaces> unstable_at(const Asked& asked, const LoopModel& loop) const;
   [[nodiscard]] std::optional<double> smallest_inertia(const PoseLoop& both, double mass_kg) const;
 
   const models::Arm& arm_;
@@ -79,6 +93,8 @@ class PassedPoses {
   std::size_t judged_ = 0;
   std::optional<UnstablePlaces> unstable_, told_;  // told_: of what was felt last
   Felt told_felt_;
+  bool finds_smallest_ = false;
+  std::vector<Place> found_;
 };
 
 }  // namespace proxarm::controller

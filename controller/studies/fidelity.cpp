@@ -352,14 +352,6 @@ std::vector<Curve> curves(const Table& table, Drawn drawn, Value y, std::map<std
   return list;
 }
 
-// Level lines where the error is 5, 10 and 25 %.
-void add_limits(Panel& panel) {
-  constexpr int faint = 7;
-  for (const double limit : limits) {
-    panel.curves.push_back({.x = {frequencies_Hz.front(), frequencies_Hz.back()}, .y = {limit, limit}, .style = faint});
-  }
-}
-
 // Error, size and phase of F/a, or of torque and angular acceleration.
 template <typename Drawn>
 std::vector<Panel> free_panels(const Table& table, Drawn drawn, bool turning, std::map<std::string, int>& styles) {
@@ -370,28 +362,34 @@ std::vector<Panel> free_panels(const Table& table, Drawn drawn, bool turning, st
   const char *const real = turning ? "inertia_real_kg_m2" : "mass_real_kg", *const imaginary =
                                                                                 turning ? "inertia_imag_kg_m2"
                                                                                         : "mass_imag_kg";
-  Panel error{.title = where + "error against the wanted " + what + " (lines: 5, 10, 25 %)",
+  Panel error{.title = where + "error against the wanted " + what,
               .x_label = "frequency (Hz)",
               .y_label = std::string("|") + ratio + " − " + asked + "|/" + asked,
               .log_x = true,
               .log_y = true,
+              .x_low = 0.1,
+              .x_high = 40.0,
               .y_low = 1e-3,
               .y_high = 10.0};
   Panel size{.title = where + what + " felt over wanted (below 0 it pulls)",
              .x_label = "frequency (Hz)",
              .y_label = std::string("Re(") + ratio + ")/" + asked,
              .log_x = true,
+             .x_low = 0.1,
+             .x_high = 40.0,
              .y_low = -2.0,
              .y_high = 3.0};
-  Panel phase{.title = where + "phase (above 0 the arm does work on the hand)",
+  Panel phase{.title = where + "phase (above 0 it pushes on)",
               .x_label = "frequency (Hz)",
               .y_label = std::string("arg(") + ratio + ") (degrees)",
               .log_x = true,
+              .x_low = 0.1,
+              .x_high = 40.0,
               .y_low = -180.0,
               .y_high = 180.0};
   const auto of_rows = [&](auto y) { return curves(table, drawn, y, styles); };
   error.curves = of_rows([&](std::size_t row) { return value(row, turning ? "inertia_error" : "mass_error"); });
-  add_limits(error);
+  error.levels.assign(limits.begin(), limits.end());
   size.curves =
       of_rows([&](std::size_t row) { return value(row, real) / value(row, turning ? "inertia_kg_m2" : "mass_kg"); });
   phase.curves = of_rows(
@@ -401,23 +399,60 @@ std::vector<Panel> free_panels(const Table& table, Drawn drawn, bool turning, st
 
 }  // namespace
 
+namespace {
+
+// Up to which frequency what is drawn feels within 10 %, of the first setup and of that with the widest band.
+std::string fidelity_answer(const Table& table, bool turning) {
+  std::map<std::string, std::map<double, double>> errors;
+  std::string first;
+  for (const std::size_t row : worst_rows(table)) {
+    const double error = table.number(row, table.column(turning ? "inertia_error" : "mass_error"));
+    if (!is_shown(table, row) || is_turning(table, row) != turning || !std::isfinite(error)) continue;
+    if (table.number(row, table.column("wall")) != 0.0) continue;
+    const std::string name = label(table, row);
+    if (first.empty()) first = name;
+    errors[name][table.number(row, table.column("frequency_Hz"))] = error;
+  }
+  if (first.empty()) return "What the hand feels at the simulated arm";
+  constexpr double limit = 0.1;
+  const auto told = [&errors](std::string name) {
+    std::array<char, 60> words{};
+    std::snprintf(words.data(), words.size(), " up to %.2g Hz", band_Hz(errors.at(name), limit));
+    constexpr std::string_view usual = ", T = 1 ms";
+    if (const std::size_t at = name.find(usual); at != std::string::npos) name.erase(at, usual.size());
+    if (const std::size_t at = name.find(", lookahead"); at != std::string::npos) name.replace(at, 2, " with ");
+    return name + (name.find("with") == std::string::npos ? " feels within 10 %" : "") + words.data();
+  };
+  const auto widest =
+      std::ranges::max_element(errors, {}, [](const auto& setup) { return band_Hz(setup.second, limit); });
+  const bool others = band_Hz(widest->second, limit) > 1.2 * band_Hz(errors.at(first), limit);
+  return told(first) + (others ? ", " + told(widest->first) : "") +
+         (turning ? ", about every axis" : ", in every direction");
+}
+
+}  // namespace
+
 std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*options*/,
                                         const std::filesystem::path& out) const {
   const auto at_wall = [&](std::size_t row) { return table.number(row, table.column("wall")) != 0.0; };
   const auto turns = [&](std::size_t row) { return is_turning(table, row); };
   const auto is_free = [&](std::size_t row) { return !at_wall(row) && !turns(row); };
-  Chart place{.title = "What the hand feels at the simulated arm, in the direction in which it is worst",
+  Chart place{.title = fidelity_answer(table, false),
               .columns = 2,
               .panel_width = 640,
               .panel_height = 460,
               .common_key = true};
   Chart turning = place;
-  turning.title = "What the hand feels at the simulated arm, turning it (4 kg), about the axis for which it is worst";
+  turning.title = fidelity_answer(table, true);
+  turning.columns = 3;
+  turning.panel_width = 560;
   Panel wall{.title = "Against a wall: stiffness felt",
              .x_label = "frequency (Hz)",
              .y_label = "|F/x| (N/m)",
              .log_x = true,
-             .log_y = true};
+             .log_y = true,
+             .x_low = 0.1,
+             .x_high = 40.0};
   std::map<std::string, int> place_styles, turning_styles;
   place.panels = free_panels(table, is_free, false, place_styles);
   wall.curves = curves(

@@ -34,11 +34,12 @@ class Library(ProgramTest):
         example = pathlib.Path(program()).parents[1] / "tests/library/example_closed_loop"
         done = subprocess.run([example], capture_output=True, text=True, timeout=600, cwd=self.folder)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
-        here = self.call("run", "--scene", "scenes/wall.yaml", "--mass", "5", "--duration", "6s", "--no-plot")
+        here = self.call("run", "--scene", "scenes/wall.yaml", "--mass", "5", "--duration", "6s", "--no-plot",
+                         "--verbose")
         self.assertEqual(here.status, 0, here.err)
         # All but the machine's times, the view, and what the command line alone looks up: the poses that were passed.
         figures = [line for line in here.out.splitlines() if line.startswith("  ")
-                   and not re.match(r"  (time|compute per cycle|not stable everywhere|view):", line)]
+                   and not re.match(r"  (time|compute per cycle|not stable everywhere|verdict|view):", line)]
         self.assertGreater(len(figures), 12)
         for line in figures:
             self.assertIn(line, done.stdout.splitlines())

@@ -76,7 +76,7 @@ class Lookahead(ProgramTest):
         nearest = min(without["felt_mass"], key=lambda point: abs(point["frequency_Hz"] - 5.0))
         self.assertAlmostEqual(nearest["error"], abs(felt - 10) / 10, delta=0.05)
         self.assertAlmostEqual(nearest["phase_deg"], math.degrees(cmath.phase(felt)), delta=3.0)
-        self.assertIn("mass by frequency", self.call("run", *arguments, "--no-plot").out)
+        self.assertIn("mass by frequency", self.call("run", *arguments, "--no-plot", "--verbose").out)
         self.assertEqual(self.summary("--duration", "3s")["felt_mass"], [])
 
     def test_a_replay_is_the_same_to_the_bit(self):

@@ -85,7 +85,7 @@ class Json(ProgramTest):
     def test_people_get_a_table_and_a_plot(self):
         outcome = self.call("run", "--duration", "0.5s")
         self.assertEqual((outcome.status, outcome.err), (0, ""))
-        for word in ("4 kg felt", "loop delay", "kg at the tip", "virtual time waits", "faults:", "proxarm-run.svg"):
+        for word in ("4 kg felt", "loop delay", "kg at the tip", "verdict:", "faults:", "proxarm-run.svg"):
             self.assertIn(word, outcome.out)
         self.assertIn("<svg", (self.folder / "proxarm-run.svg").read_text())
         self.assertNotIn("\x1b", outcome.out, "a live line is for terminals")

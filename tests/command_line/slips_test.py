@@ -1,8 +1,12 @@
 """What somebody does on the first day: files in each other's place, options that have nothing to act on, help."""
+import json
+import os
+import pty
 import re
+import subprocess
 import unittest
 
-from harness import SOURCE, ProgramTest
+from harness import SOURCE, ProgramTest, program
 
 CELL = SOURCE / "models/cells/default.yaml"
 SCENE, HAND, URDF = SOURCE / "scenes/wall.yaml", SOURCE / "sim/hands/touch.yaml", SOURCE / "models/arms/arm150.urdf"
@@ -109,14 +113,52 @@ class Help(ProgramTest):
 
 class WhatIsPrinted(ProgramTest):
     def lines_of(self, *arguments):
-        out = self.call("run", "--no-plot", *arguments).out
+        out = self.call("run", "--no-plot", "--verbose", *arguments).out
         return {line[:26].strip(" :"): line[28:] for line in out.splitlines() if line.startswith("  ")}
 
     def test_no_overruns_are_counted_where_time_waits(self):
         # "max 12075.9 µs; overruns 0" read as a contradiction.
-        self.assertTrue(self.lines_of("--duration", "1s")["compute per cycle"].endswith("µs; virtual time waits for them"))
+        self.assertTrue(self.lines_of("--duration", "1s")["compute per cycle"].endswith("simulated time stands still meanwhile"))
         realtime = self.lines_of("--duration", "0.1s", "--pace", "realtime")
         self.assertRegex(realtime["compute per cycle"], r"; overruns \d+$")
+
+    def test_it_is_eight_lines_unless_something_went_wrong(self):
+        # Of 22 lines a reader had to find the two that told how it went.
+        names = ["ended", "apparent mass", "contact", "accuracy", "limits active", "faults", "verdict", "plot"]
+        out = self.call("run").out
+        self.assertEqual([line.strip().split(":")[0] for line in out.splitlines() if line.startswith("  ")], names)
+        self.assertIn("\n  verdict:                  fine: no fault, nothing swung\n", out)
+        failed = self.call("run", "--no-plot", "--fault", "sensor:frozen@4s").out
+        self.assertIn("\n  FAULT:                    sensor_frozen", failed)
+        self.assertIn("\n  verdict:                  a fault ended it: sensor_frozen\n", failed)
+        self.assertEqual(json.loads(self.call("run", "--json").out)["verdict"]["word"], "fine")
+
+    def on_a_terminal(self, **environment):
+        ours, theirs = pty.openpty()
+        done = subprocess.Popen([program(), "run", "--duration", "1s", "--no-plot"], cwd=self.folder, stdout=theirs,
+                                stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                env={**os.environ, "TERM": "xterm", **environment})
+        os.close(theirs)
+        out = b""
+        while True:
+            try:
+                part = os.read(ours, 4096)
+            except OSError:  # EIO: the other side is closed
+                break
+            if not part:
+                break
+            out += part
+        os.close(ours)
+        self.assertEqual(done.wait(), 0)
+        return out.decode()
+
+    def test_it_is_coloured_on_a_terminal_that_wants_it(self):
+        told = self.on_a_terminal()
+        self.assertIn("\x1b[32mfine: no fault, nothing swung\x1b[0m", told)
+        for environment in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
+            self.assertNotIn("\x1b", self.on_a_terminal(**environment))
+        self.assertIn("\x1b[32m", self.on_a_terminal(NO_COLOR=""))
+        self.assertNotIn("\x1b", self.call("run", "--no-plot").out)
 
     def test_a_scene_that_was_not_touched_is_told(self):
         room = SOURCE / "scenes/room.yaml"

@@ -1,5 +1,6 @@
 """The page of the view in a real browser: what stands in its scene graph, and what is to be seen in its pixels."""
 import csv
+import json
 import math
 import os
 import re
@@ -416,7 +417,7 @@ class Page(ProgramTest):
             browser.picture("refusal-light")
             # An order's answer stands below the orders; out of a hold alone there is something to resume.
             browser.run("document.getElementById('panel').scrollTop = 1e6")
-            browser.run("document.querySelector('[data-line=resume]').click()")
+            browser.run("proxarm.control.ask('resume')")
             browser.until("document.getElementById('answer').dataset.refused === 'true'", "that nothing is held")
             self.assert_seen(browser, "#answer", "the reason")
             # What is typed next takes the reason away.
@@ -424,6 +425,107 @@ class Page(ProgramTest):
             browser.run("document.getElementById('set-mass').focus()")
             browser.command("Input.insertText", dict(text="5"))
             self.assertEqual(browser.run("return document.getElementById('answer-mass').textContent"), "")
+            self.assertEqual(browser.complaints(), [])
+
+    def test_orders_that_arent_possible_are_disabled_with_the_reason(self):
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view-control", "--no-plot", "--duration", "10min") as session:
+            self.opened(browser, session)
+
+            def possible():
+                return browser.run("""return [...document.querySelectorAll('#orders button')].filter((b) => !b.disabled)
+                                             .map((b) => b.dataset.line)""")
+            browser.until(f"{NOW}.phase === 3 && proxarm.control.phase === 'rendering'", "rendering")
+            self.assertEqual(possible(), ["hold"])
+            self.assertEqual(browser.run("return document.getElementById('not-now').textContent"),
+                             "resume, release, back off 20 mm: the arm isn’t in a hold; reset: no stop by a fault waits for it")
+            self.assertIn("the arm isn’t in a hold", browser.run("return document.querySelector('[data-line=resume]').title"))
+            browser.run("document.querySelector('[data-line=hold]').click()")
+            browser.until("proxarm.control.phase === 'holding'", "the hold")
+            self.assertEqual(possible(), ["resume", "release", "back-off 20mm"])
+            browser.run("document.querySelector('[data-line=resume]').click()")
+            browser.until("proxarm.control.phase === 'rendering'", "rendering again")
+            self.assertEqual(possible(), ["hold"])
+            self.assertEqual(browser.complaints(), [])
+
+    def test_the_microscope_shows_where_tool_and_steel_are(self):
+        """24 µm and what the gears give are far below a pixel of the picture."""
+        self.call("run", "--no-plot", "--record", "session", "--duration", "7s")
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        touching = [i for i, row in enumerate(rows) if row["contact"] != "free"]
+        with view_browser.Browser() as browser, Session(self.folder, "view", "session") as session:
+            self.opened(browser, session)
+            for index in touching[200::len(touching) // 6]:
+                browser.run(f"proxarm.player.goTo({index})")
+                browser.until(f"proxarm.player.isShown({index}) && !proxarm.microscope.box.hidden", "that cycle")
+                part = lambda name: [float(rows[index][f"{name}_W_{axis}_{'1' if name == 'normal' else 'm'}"]) for axis in "xyz"]
+                proxy, normal = part("proxy"), part("normal")
+                for thing, place in (("tool", part("tool")), ("steel", part("true_tool"))):
+                    apart = [a - b for a, b in zip(place, proxy)]
+                    up = sum(a * n for a, n in zip(apart, normal))
+                    aside, told_up = browser.run(f"return proxarm.microscope.section.{thing}")
+                    self.assertAlmostEqual(told_up, up, delta=1e-8, msg=thing)
+                    if thing == "tool":
+                        self.assertAlmostEqual(aside, math.hypot(*(a - up * n for a, n in zip(apart, normal))), delta=1e-8)
+                bar = browser.run("return proxarm.microscope.bar_m")
+                self.assertTrue(1e-6 <= bar <= 1e-2, bar)
+            # How far from swinging it is there, as the session's judge had it.
+            with open(self.folder / "session" / "summary.json") as file:
+                places = json.load(file)["poses"]["places"]
+            self.assertGreater(len(places), 4)
+            now = browser.run("return proxarm.panel.moment.time_s")
+            place = [place for place in places if place["time_s"] <= now][-1]
+            self.assertIn(f"{place['smallest_stable_mass_kg']:.2g} kg ({4.0 / place['smallest_stable_mass_kg']:.2f} ×)",
+                          browser.run("return document.getElementById('figures').innerText"))
+            # An impact is told as the impulse that it is, not by its force in a cycle.
+            begin = next(i for i in touching if rows[i - 1]["contact"] == "free")
+            size = lambda row, name: math.hypot(*(float(row[f"{name}_W_{axis}_N"]) for axis in "xyz"))
+            impulse = sum(max(0.0, size(rows[i], "contact_force") - size(rows[i], "force")) * 1e-3
+                          for i in range(begin, begin + 51) if rows[i]["contact"] != "free")
+            browser.run(f"proxarm.player.goTo({begin + 60})")
+            browser.until(f"proxarm.player.isShown({begin + 60})", "just after it")
+            self.assertAlmostEqual(browser.run("return proxarm.panel.moment.blow_Ns"), impulse, delta=0.01 * impulse)
+            self.assertIn("Ns", browser.run("return document.getElementById('labels').innerText"))
+            browser.run("proxarm.world.drawFine()")
+            time.sleep(0.5)
+            browser.picture("microscope-light")
+            # Values under the pointer.
+            box = browser.run("const b = document.querySelector('.plot').getBoundingClientRect(); return [b.left, b.top, b.width]")
+            browser.command("Input.dispatchMouseEvent", dict(type="mouseMoved", x=box[0] + 0.7 * box[2], y=box[1] + 80))
+            told = browser.until("!document.querySelector('.values').hidden && document.querySelector('.values').textContent",
+                                 "values")
+            self.assertRegex(told, r"^[\d.]+ s\npeaks [\d.]+\nhand [\d.]+\ncontact [\d.]+ N$")
+            browser.press("m", text="m")
+            browser.until("document.getElementById('microscope').hidden", "without it")
+            self.assertEqual(browser.complaints(), [])
+
+    def test_what_is_felt_stands_beside_what_is_meant(self):
+        """A mass by force over acceleration, and a layer's spring by force over depth, both as the scene has them."""
+        self.call("run", "--no-plot", "--record", "shaken", "--duration", "8s", "--scene", SOURCE / "scenes/free.yaml",
+                  "--hand", SOURCE / "sim/hands/sweep.yaml")
+        self.call("run", "--no-plot", "--record", "foam", "--duration", "8s", "--scene", SOURCE / "scenes/soft_wall.yaml")
+        with view_browser.Browser() as browser:
+            with Session(self.folder, "view", "shaken") as session:
+                self.opened(browser, session)
+                browser.run("proxarm.player.goTo(4000)")
+                browser.until("proxarm.player.isShown(4000)", "that cycle")
+                felt = browser.until("proxarm.felt.points?.length > 100 && proxarm.felt.felt_kg", "points")
+                self.assertAlmostEqual(felt, 4.0, delta=0.2)
+                self.assertIn("which no hand tells from what is meant", browser.run("return document.querySelector('#felt p').textContent"))
+            with Session(self.folder, "view", "foam") as session:
+                self.opened(browser, session)
+                browser.run("proxarm.player.goTo(6000)")
+                browser.until("proxarm.player.isShown(6000)", "that cycle")
+                browser.until("proxarm.felt.touched?.length > 100", "points")
+                slope, meant = browser.run("""
+                    const pressed = proxarm.felt.touched.filter(([depth]) => depth > 2);
+                    const layer = proxarm.stage.scene.objects.find((object) => object.layer).layer;
+                    return [pressed.reduce((sum, [d, f]) => sum + f / d, 0) / pressed.length, layer.stiffness / 1e3];""")
+                self.assertAlmostEqual(slope / meant, 1.0, delta=0.2)  # with friction, which is in the force as well
+                browser.run("document.getElementById('felt').scrollIntoView({ block: 'end' })")
+                time.sleep(0.5)
+                browser.picture("felt-light")
             self.assertEqual(browser.complaints(), [])
 
     def test_a_unit_may_be_typed(self):

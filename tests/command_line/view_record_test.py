@@ -196,7 +196,10 @@ class Colours(ProgramTest):
         """What sticks was blue in the view and grey in the plot, what slips orange in the view and blue in the plot."""
         self.call("run", "--record", "session", "--duration", "6s")
         drawn = (self.folder / "session" / "plot.svg").read_text().replace(" ", "")
-        light = (SOURCE / "controller/view/page/style.css").read_text().split(":root[data-theme")[0]
+        with Session(self.folder, "view", "session") as viewed:
+            status, _, palette = viewed.request("/palette.css", Cookie=viewed.cookie())
+        self.assertEqual(status, 200)
+        light = palette.decode().split(":root[data-theme")[0]
         for name in ("tool", "proxy", "hand", "shade-stick", "shade-slip"):
             with self.subTest(name):
                 number = re.search(rf"--{name}: #(\w+);", light)[1]

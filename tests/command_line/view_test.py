@@ -133,7 +133,8 @@ class Apart(ProgramTest):
     def test_without_the_flag_there_is_nothing_of_it(self):
         """What the session has, by itself and in full: three threads, these libraries, no socket, and the keeper of the black
         box; and the same beside a view."""
-        process = subprocess.Popen([program(), "run", "--pace", "realtime", "--duration", "20s", "--no-plot"], cwd=self.folder,
+        process = subprocess.Popen([program(), "run", "--pace", "realtime", "--duration", "20s", "--no-plot",
+                                    "--verbose"], cwd=self.folder,
                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         try:
             time.sleep(1.5)

@@ -46,6 +46,7 @@ class BusMapping {
 struct ViewPlace {
   std::uint16_t port = 0;
   std::size_t most_viewers = 0;
+  int line = -1;  // the socket to its process
 };
 
 struct RunOptions {
@@ -79,6 +80,7 @@ struct RunOptions {
   std::filesystem::path plot_file;                                    // empty: proxarm-run.svg, none with --json
   bool plot = true;
   bool json = false;
+  bool verbose = false;  // all figures in the summary, not the eight lines
   bool force_unstable = false;
   bool view = false;                         // show the session in a browser
   bool view_control = false;                 // and let it be changed there

@@ -30,11 +30,13 @@ void PoseWatch::work() {
     const controller::PassedPoses::Asked asked = std::move(asked_.front());
     asked_.pop_front();
     busy_ = true;
+    const std::size_t found_before = poses_.places().size();
     lock.unlock();
     const std::optional<controller::UnstablePlaces> told = poses_.judge(asked);
     lock.lock();
     busy_ = false;
     if (told) news_.push_back(*told);
+    if (poses_.places().size() > found_before) found_.push_back(poses_.places().back());
     changed_.notify_all();
   }
 }
@@ -44,10 +46,15 @@ std::vector<controller::UnstablePlaces> PoseWatch::news() {
   return std::exchange(news_, {});
 }
 
+std::vector<controller::PassedPoses::Place> PoseWatch::places() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(found_, {});
+}
+
 controller::PosesSummary PoseWatch::summary() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return asked_.empty() && !busy_; });
-  return {.judged = poses_.judged(), .unstable = poses_.unstable()};
+  return {.judged = poses_.judged(), .unstable = poses_.unstable(), .places = poses_.places()};
 }
 
 }  // namespace proxarm::command_line

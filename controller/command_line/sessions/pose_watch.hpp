@@ -21,6 +21,8 @@ class PoseWatch {
   PoseWatch& operator=(const PoseWatch&) = delete;
   ~PoseWatch();  // what isn't judged by then isn't
 
+  // Before the first place.
+  void find_smallest() { poses_.find_smallest(); }
   void change(const controller::LoopModel& loop) { poses_.change(loop); }
   template <class Joints>
   void pass(double time_s, const models::ToolPose& tool_W, const controller::PassedPoses::Felt& felt,
@@ -29,6 +31,8 @@ class PoseWatch {
   }
   // What should be told by now and wasn't yet, in its order.
   [[nodiscard]] std::vector<controller::UnstablePlaces> news();
+  // Places judged since it was asked last, where the smallest stable mass is looked for.
+  [[nodiscard]] std::vector<controller::PassedPoses::Place> places();
   // Waits until all is judged.
   [[nodiscard]] controller::PosesSummary summary();
 
@@ -41,6 +45,7 @@ class PoseWatch {
   std::condition_variable changed_;
   std::deque<controller::PassedPoses::Asked> asked_;
   std::vector<controller::UnstablePlaces> news_;
+  std::vector<controller::PassedPoses::Place> found_;  // and not told yet
   bool busy_ = false, ends_ = false;
   std::thread thread_;
 };

@@ -10,7 +10,9 @@
 #include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
+#include "controller/command_line/sessions/view_process.hpp"
 #include "controller/library/session_summary.hpp"
+#include "controller/report/terminal.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -81,6 +83,7 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   if (!session.impedance()) {
     poses_ = std::make_unique<PoseWatch>(controller::PassedPoses(deriver_.arm(), session.cell, hand_model(session),
                                                                  session.loop, turned_model(session)));
+    if (options.view_place || !options.record_dir.empty()) poses_->find_smallest();
   }
   swing_ = slowest_swing(session);
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
@@ -255,6 +258,9 @@ void SessionOutput::judge_pose(const CycleRecord& record) {
   const models::ToolPose tool_W{controller::vec3(record.tool_W_m),
                                 turns ? models::Quaternion(record.proxy_q_W.data()) : models::Quaternion::Identity()};
   poses_->pass(1e-9 * static_cast<double>(record.time_ns), tool_W, felt, joints_rad);
+  if (options_.view_place) {
+    for (const controller::PassedPoses::Place& place : poses_->places()) tell_margin(*options_.view_place, place);
+  }
   say_poses();
 }
 
@@ -334,10 +340,11 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   if (options_.json) {
     std::printf("%s\n", controller::summary_json(summary).c_str());
   } else {
-    std::printf("%s%s", controller::summary_text(summary).c_str(), clocks_text(summary, options_).c_str());
+    const controller::SummaryLook look{.verbose = options_.verbose, .colour = controller::shows_colour(stdout)};
+    std::printf("%s%s", controller::summary_text(summary, look).c_str(), clocks_text(summary, options_).c_str());
   }
   std::fflush(stdout);
-  const bool drawn = draw_plot();
+  const bool drawn = draw_plot(summary);
   if (writer_) writer_->finish(summary);
   if (ended_by_fault) {
     if (!options_.json && !summary.black_box.empty()) {
@@ -349,7 +356,7 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   return summary.oscillation && summary.oscillation->lasts ? fault_ended_the_run : fine;
 }
 
-bool SessionOutput::draw_plot() {
+bool SessionOutput::draw_plot(const Summary& summary) {
   if (!plot_) return true;
   if (plot_->is_empty()) {  // as of a session that was stopped before; whoever stops it knows
     if (!options_.json) std::printf("  plot:                     none; nothing was rendered\n");
@@ -357,7 +364,7 @@ bool SessionOutput::draw_plot() {
   }
   fs::path file = options_.plot_file;
   if (file.empty()) file = options_.record_dir.empty() ? fs::path(default_plot) : options_.record_dir / "plot.svg";
-  const std::string warning = plot_->write(file);
+  const std::string warning = plot_->write(file, controller::plot_headline(summary));
   if (!warning.empty()) {
     std::fprintf(stderr, "proxarm: %s\n", warning.c_str());
   } else if (!options_.json) {

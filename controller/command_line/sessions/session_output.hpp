@@ -46,7 +46,7 @@ class SessionOutput {
 
  private:
   void refuse_lost_plot() const;
-  bool draw_plot();
+  bool draw_plot(const controller::Summary& summary);
   void say_timestep(const controller::CycleRecord& record);
   void follow_lateness(const controller::CycleRecord& record);
   [[nodiscard]] controller::LoopModel judged_loop() const;

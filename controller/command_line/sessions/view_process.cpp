@@ -86,6 +86,15 @@ std::string read_line(int line) {
 
 }  // namespace
 
+void tell_margin(const ViewPlace& place, const controller::PassedPoses::Place& judged) {
+  const Json told{{"margin",
+                   {{"time_s", judged.time_s},
+                    {"felt_mass_kg", judged.felt_mass_kg},
+                    {"smallest_stable_mass_kg", judged.smallest_stable_mass_kg}}}};
+  const std::string text = told.dump() + "\n";
+  (void)send(place.line, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
 fs::path view_control_path() { return default_control_path().parent_path() / ("view-" + std::to_string(getpid())); }
 
 void remove_view_control() {
@@ -133,7 +142,7 @@ void ViewProcess::greet(const PreparedSession& session, const RunOptions& option
   if (const auto url = answer.text_of("url")) {
     url_ = *url;
     place_ = {static_cast<std::uint16_t>(answer.integer_of("port").value_or(0)),
-              static_cast<std::size_t>(answer.integer_of("most_viewers").value_or(0))};
+              static_cast<std::size_t>(answer.integer_of("most_viewers").value_or(0)), line_};
     return;
   }
   if (const auto error = answer.text_of("error")) throw SetupError({.message = *error});

@@ -12,6 +12,7 @@
 
 #include "controller/command_line/live/browser.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/stability/passed_poses.hpp"
 
 namespace proxarm::command_line {
 
@@ -44,6 +45,9 @@ class ViewProcess {
   int line_ = -1;
   int child_ = -1;
 };
+
+// How far from swinging the session is from now on, for whoever looks. Waits for nobody.
+void tell_margin(const ViewPlace& place, const controller::PassedPoses::Place& judged);
 
 // The socket that --view-control has where there is no --control: of this session alone.
 std::filesystem::path view_control_path();

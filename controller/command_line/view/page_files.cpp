@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "controller/command_line/preparation/data_files.hpp"
+#include "controller/drawing/palette.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -13,6 +14,7 @@ view::Assets page_files() {
   view::add_page(assets, shipped_file("controller/view/page"));
   const char* const elsewhere = std::getenv("PROXARM_THREE");
   view::add_three(assets, elsewhere != nullptr && *elsewhere != '\0' ? elsewhere : "/usr/share/javascript/three");
+  assets["/palette.css"] = view::make_asset("text/css; charset=utf-8", controller::palette_css());
   return assets;
 }
 

@@ -3,6 +3,7 @@
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
 #include <cstdio>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -81,10 +82,30 @@ class PlayView {
     }
     stage["record"] = {{"name", folder_.filename().string()}, {"cycles", session_.size()},
                        {"from_s", session_.time_s(0)},        {"to_s", session_.time_s(session_.size() - 1)},
-                       {"open_at", session_.opening()},       {"events", events}};
+                       {"open_at", session_.opening()},       {"events", events},
+                       {"margins", margins_of(folder_)}};
     socket.say(text_of({{"stage", stage}}), false);
     socket.say(history(0, session_.size() - 1, overview_rows), true);
     show(socket, session_.opening());
+  }
+
+  // How far from swinging it was, place by place, as the session's summary has it; none in a black box.
+  static json margins_of(const fs::path& folder) {
+    json margins = json::array();
+    std::ifstream in(folder / "summary.json");
+    const json summary = json::parse(in, nullptr, false);
+    constexpr const char* places = "/poses/places";
+    const json::json_pointer at(places);
+    if (!summary.is_object() || !summary.contains(at) || !summary.at(at).is_array()) return margins;
+    for (const json& place : summary.at(at)) {
+      const auto number = [&place](const char* key) {
+        return place.is_object() && place.contains(key) && place[key].is_number() ? place[key] : json(nullptr);
+      };
+      margins.push_back({{"time_s", number("time_s")},
+                         {"felt_mass_kg", number("felt_mass_kg")},
+                         {"smallest_stable_mass_kg", number("smallest_stable_mass_kg")}});
+    }
+    return margins;
   }
 
   view::Bytes history(std::size_t from, std::size_t to, std::size_t rows) const {

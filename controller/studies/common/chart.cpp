@@ -5,43 +5,26 @@
 #include <cmath>
 #include <sstream>
 
-#include "controller/report/gnuplot.hpp"
+#include "controller/drawing/gnuplot.hpp"
+#include "controller/drawing/palette.hpp"
 
 namespace proxarm::studies {
 namespace {
 
 using controller::gnuplot_string;
 
-struct Style {
-  const char* colour;
-  double width;
-  const char* dash;
-  int mark;
-};
-
-// Okabe and Ito's colours, told apart by the colour-blind.
-constexpr std::array<Style, 10> styles{{{"#0072b2", 2.6, "solid", 7},
-                                        {"#000000", 1.8, "(9,5)", 6},
-                                        {"#d55e00", 2.4, "(14,5)", 5},
-                                        {"#009e73", 2.6, "(2,4)", 9},
-                                        {"#cc79a7", 2.4, "(12,4,2,4)", 8},
-                                        {"#e69f00", 2.4, "(6,3)", 13},
-                                        {"#56b4e9", 2.0, "(4,4)", 11},
-                                        {"#7f7f7f", 1.6, "solid", 4},
-                                        {"#7a0177", 2.0, "(16,4,2,4,2,4)", 12},
-                                        {"#8c510a", 2.0, "(3,2)", 10}}};
-
 void define_styles(std::ostream& gp) {
-  for (std::size_t i = 0; i < styles.size(); ++i) {
-    const Style& s = styles[i];
-    gp << "set style line " << i + 1 << " lc rgb '" << s.colour << "' lw " << s.width << " pt " << s.mark
-       << " ps 0.9 dt " << s.dash << "\n";
+  int number = 0;
+  for (const controller::SeriesStyle& s : controller::series_styles()) {
+    gp << "set style line " << ++number << " lc rgb '" << s.colour << "' lw " << s.width << " pt " << s.mark
+       << " ps 0.9 " << controller::gnuplot_dash(s.dash) << "\n";
   }
 }
 
 void range(std::ostream& gp, char axis, double low, double high, bool log) {
   gp << (log ? "set" : "unset") << " logscale " << axis << "\n";
-  if (log) {
+  const bool readable = low >= 1e-3 && high <= 1e4 && low < high;
+  if (log && !readable) {
     gp << "set format " << axis << " '10^{%L}'\n";
   } else {
     gp << "set format " << axis << " '%g'\n";
@@ -90,13 +73,33 @@ void name_places(std::ostream& gp, const std::vector<std::string>& names) {
 
 namespace {
 
+constexpr int most_levels = 9;
+
+// Level lines of y across the panel, each with its value at its right end.
+void draw_levels(std::ostream& gp, const std::vector<double>& levels) {
+  gp << "unset arrow\n";
+  for (int label = 1; label <= most_levels; ++label) gp << "unset label " << label << "\n";
+  int label = 0;
+  for (const double level : levels) {
+    gp << "set arrow from graph 0, first " << level << " to graph 1, first " << level
+       << " nohead lc rgb '#6f6f6f' lw 1.2 dt (3,3)\nset label " << ++label << " '" << 100.0 * level
+       << " %' at graph 0.985, first " << level << " right offset 0,0.45 font 'sans,15' textcolor rgb '#515d69'\n";
+  }
+}
+
 // Rows of the common key, in columns of the width that the longest names take.
 int key_rows(const Chart& chart) {
   if (!chart.common_key || chart.panels.empty()) return 0;
-  constexpr int column_width = 500;
-  const auto named = std::ranges::count_if(chart.panels[0].curves,
-                                           [](const Curve& curve) { return !curve.name.empty() && !curve.x.empty(); });
-  const auto columns = std::max(1, chart.columns * chart.panel_width / column_width);
+  constexpr int sample_width = 150, letter_width = 12;  // of 19 points, with what gnuplot leaves between columns
+  std::size_t named = 0, longest = 0;
+  for (const Curve& curve : chart.panels[0].curves) {
+    if (curve.name.empty() || curve.x.empty()) continue;
+    ++named;
+    longest = std::max(longest, curve.name.size());
+  }
+  const std::size_t column_width = sample_width + letter_width * longest;
+  const std::size_t columns =
+      std::max<std::size_t>(1, static_cast<std::size_t>(chart.columns * chart.panel_width) / column_width);
   return static_cast<int>((named + columns - 1) / columns);
 }
 
@@ -130,12 +133,13 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
        << plain(panel.y_label) << "\n";
     if (chart.common_key && i == 0) {
       gp << "set key at screen 0.5, screen " << (12.0 + 0.5 * key_height) / height << " center vertical maxrows "
-         << named_rows << " samplen 4 width 3\n";
+         << named_rows << " samplen 4 Left reverse\n";
     } else if (chart.common_key || !panel.key) {
       gp << "unset key\n";
     } else {
-      gp << "set key outside right top vertical maxcols 1 samplen 3 spacing 1.1 font ',16'\n";
+      gp << "set key outside right top vertical maxcols 1 samplen 3 spacing 1.1 Left reverse font ',16'\n";
     }
+    draw_levels(gp, panel.levels);
     std::string plot = "plot ";
     for (const Curve& curve : panel.curves) {
       if (curve.x.empty()) continue;
@@ -147,7 +151,7 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
         }
       }
       data << "\n\n";
-      const std::size_t style = static_cast<std::size_t>(curve.style) % styles.size() + 1;
+      const std::size_t style = static_cast<std::size_t>(curve.style) % controller::series_styles().size() + 1;
       if (plot.size() > 5) plot += ", ";
       plot += "'data' index " + std::to_string(block++) + " using 1:2 with " +
               (curve.line ? (curve.marks ? "linespoints" : "lines") : "points") + " ls " + std::to_string(style) +
@@ -204,6 +208,32 @@ Contour contour(const Map& map, double level) {
   return found;
 }
 
+// Where a point is in the panel, as shares of its width and height.
+std::array<double, 2> place_in(const Map& map, double x, double y) {
+  const auto share = [](double v, const std::vector<double>& grid, bool log) {
+    const auto f = [log](double u) { return log ? std::log(u) : u; };
+    return (f(v) - f(grid.front())) / (f(grid.back()) - f(grid.front()));
+  };
+  return {share(x, map.x, map.log_x), share(y, map.y, map.log_y)};
+}
+
+// Whether a number there lies over none of the others.
+bool is_room(const std::vector<std::array<double, 2>>& labelled, const std::array<double, 2>& place) {
+  constexpr double width = 0.16, height = 0.13;  // of a number, as shares of the panel
+  return std::ranges::none_of(labelled, [&place](const std::array<double, 2>& other) {
+    return std::abs(other[0] - place[0]) < width && std::abs(other[1] - place[1]) < height;
+  });
+}
+
+std::string map_steps() {
+  std::string steps;
+  const auto colours = controller::map_colours();
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    steps += (i == 0 ? "" : ", ") + std::to_string(i) + " '" + colours[i] + "'";
+  }
+  return steps;
+}
+
 }  // namespace
 
 std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
@@ -214,7 +244,10 @@ std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
   const int height = static_cast<int>(rows) * 430 + 90;
   gp << "set terminal svg size " << chart.columns * 620 << "," << height
      << " font 'sans,19' background 'white' enhanced\nset output 'plot.svg'\nset encoding utf8\n"
-     << "set palette defined (0 '#fff7bc', 0.35 '#fe9929', 0.7 '#8c2d04', 1 '#1a0a30')\nset tics scale 0.7 front\n"
+     << "set palette maxcolors " << 2 * (controller::map_colours().size() - 1) << "\nset palette defined ("
+     << map_steps() << ")\nset tics scale 0.7 front\n"
+     << "set object 1 rectangle from graph 0, graph 0 to graph 1, graph 1 behind fillcolor rgb '#c9d0d6' fillstyle "
+        "solid noborder\n"
      << "set multiplot\nset label 1000 " << plain(chart.title) << " at screen 0.5, screen " << 1.0 - 26.0 / height
      << " center font 'sans,22'\nset label 1001 " << plain(chart.note) << " at screen 0.5, screen " << 18.0 / height
      << " center\nunset key\n";
@@ -222,6 +255,8 @@ std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
   for (std::size_t i = 0; i < chart.maps.size(); ++i) {
     const Map& map = chart.maps[i];
     place(gp, i, chart.columns, chart.maps.size(), 50.0 / height, 40.0 / height);
+    const double width = 1.0 / static_cast<double>(columns), left = static_cast<double>(i % columns) * width;
+    gp << "set lmargin at screen " << left + 0.19 * width << "\nset rmargin at screen " << left + 0.84 * width << "\n";
     range(gp, 'x', map.x.front(), map.x.back(), map.log_x);
     range(gp, 'y', map.y.front(), map.y.back(), map.log_y);
     gp << "set format x '%g'\nset format y '%g'\n";
@@ -252,14 +287,22 @@ std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
     data << (drawn > 0 ? cells.str() : "1 1 1 1 1 1 nan\n") << "\n\n";
     std::string plot = "plot 'data' index " + std::to_string(block++) +
                        " using 1:2:3:4:5:6:7 with boxxyerror fillstyle solid 1.0 noborder lc palette";
+    gp << (i % columns + 1 == columns ? "set" : "unset") << " colorbox\n";  // one for a row
     int label = 2000;
+    std::vector<std::array<double, 2>> labelled;
     for (const double level : chart.contours) {
       const Contour line = contour(map, level);
       if (line.lines.empty()) continue;
       data << line.lines << "\n";
-      plot += ", 'data' index " + std::to_string(block++) + " using 1:2 with lines lw 1.5 lc rgb '#2060c0'";
-      gp << "set label " << label++ << " '" << level << "' at " << line.label_x << "," << line.label_y
-         << " center front font 'sans,15' textcolor rgb '#2060c0' boxed\n";
+      // White below black: to be seen on every colour.
+      const std::string index = std::to_string(block++);
+      plot += ", 'data' index " + index + " using 1:2 with lines lw 4 lc rgb '#ffffff', '' index " + index +
+              " using 1:2 with lines lw 1.6 lc rgb '#000000'";
+      const std::array<double, 2> place = place_in(map, line.label_x, line.label_y);
+      if (!is_room(labelled, place)) continue;
+      labelled.push_back(place);
+      gp << "set label " << label++ << " '" << level << "' at graph " << std::clamp(place[0], 0.05, 0.95) << ", graph "
+         << std::clamp(place[1], 0.06, 0.94) << " center front font 'sans,17' boxed\n";
     }
     gp << "set style textbox opaque noborder fillcolor rgb '#ffffff'\n" << plot << "\nunset label\n";
   }

@@ -24,6 +24,7 @@ struct Panel {
   double x_low = 0.0, x_high = 0.0;  // equal: as the data are
   double y_low = 0.0, y_high = 0.0;
   std::vector<std::string> x_names{};  // x counts these, from 0
+  std::vector<double> levels{};        // of y: each a faint line with its value in per cent
 };
 
 struct Chart {
@@ -38,7 +39,7 @@ struct Chart {
 // Writes the SVG. Returns a warning in one line where that didn't work; empty when it did.
 [[nodiscard]] std::string draw(const Chart& chart, const std::filesystem::path& svg);
 
-// z over x and y, each a grid's lines; values that aren't finite stay white.
+// z over x and y, each a grid's lines; values that aren't finite stay grey.
 struct Map {
   std::string title{}, x_label{}, y_label{};  // what z is stands in the chart's title
   bool log_x = false, log_y = false, log_z = false;
@@ -51,8 +52,8 @@ struct MapChart {
   int columns = 1;
   std::vector<Map> maps{};
   double z_low = 0.0, z_high = 0.0;  // equal: as the data are
-  std::vector<double> contours{};    // values of z at which lines are drawn, each with its value
-  std::string note{};                // below: what white is
+  std::vector<double> contours{};    // values of z at which lines are drawn, each with its value where there is room
+  std::string note{};                // below: what grey is
 };
 
 [[nodiscard]] std::string draw(const MapChart& chart, const std::filesystem::path& svg);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "controller/drawing/palette.hpp"
 #include "controller/signals/contact_columns.hpp"
 #include "controller/supervision/fault.hpp"
 #include "controller/view/stage/json_text.hpp"
@@ -248,7 +249,11 @@ std::string contacts_message(const Stage& stage, const controller::CycleRecord& 
 
 std::string contact_arrows_message(const controller::CycleRecord& record) {
   constexpr double metres_per_N = 0.005, thickness_m = 0.004;
-  constexpr Colour sticks{0.0, 0.447, 0.698, 1.0}, slips{0.835, 0.369, 0.0, 1.0};
+  const auto painted = [](const char* name) {
+    const controller::Rgb rgb = controller::on_white(controller::colour(name).light);
+    return Colour{rgb.r, rgb.g, rgb.b, 1.0};
+  };
+  const Colour sticks = painted("stick"), slips = painted("slip");
   Entity entity(sticks);
   for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
     const controller::RecordedContact& contact = record.contacts[i];

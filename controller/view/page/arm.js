@@ -1,7 +1,7 @@
 // The arm as its URDF draws it, and the handle behind the sensor.
 import * as THREE from './three/build/three.module.js';
 import { capsuleGeometry, cylinderGeometry, fetchMesh, hullGeometry, setPose, vec } from './shapes.js';
-import { isDark, onTheme } from './theme.js';
+import { colour, onTheme } from './theme.js';
 
 const EDGE_ANGLE_DEG = 30;
 
@@ -22,12 +22,11 @@ export class ArmView extends THREE.Group {
   }
 
   paint() {
-    const dark = isDark();
-    this.materials[0].color.set(dark ? 0x8fa0b1 : 0xe3e8ed);
-    this.materials[1].color.set(dark ? 0x5d6e80 : 0x94a3b2);
-    this.handleMaterial.color.set(dark ? 0xc98a2b : 0xd9923b);
-    this.toolMaterial.color.set(dark ? 0x7f9fd6 : 0x7c9bd0);
-    this.edgeMaterial.color.set(dark ? 0x0b1016 : 0x51606f);
+    this.materials[0].color.set(colour('--arm'));
+    this.materials[1].color.set(colour('--arm-joint'));
+    this.handleMaterial.color.set(colour('--handle'));
+    this.toolMaterial.color.set(colour('--tool-body'));
+    this.edgeMaterial.color.set(colour('--arm-edge'));
   }
 
   makeLink(link, index) {

@@ -13,6 +13,7 @@ const MOST_N = 40;
 const CONE_HEIGHT = 0.1;
 const TRAIL_POINTS = 360;
 const LEAST_N = 0.005;  // what two decimals say of a force
+const LEAST_NS = 0.005, BLOW_S = 1;  // smaller impulses aren't told; for how long one is
 const FREE = 0;
 
 const at = (moment, name) => new THREE.Vector3(...vector(moment, name));
@@ -219,6 +220,11 @@ export class ContactView extends THREE.Group {
       out.push({ name: `contact ${i}`, at: at(place, 'point').add(this.arrowOf(place, 'force')), text: text(newtonsOf(touch)),
                  colour: touch.slips ? '--slip' : '--stick', beside: [-78, -40], yields: i > 0 });
     });
+    // A blow is over before it can be read, and its force in newtons is the timestep's: for a moment its impulse stands.
+    if (told.blow_Ns >= LEAST_NS && told.time_s - told.blow_s < BLOW_S && moment.touches.length) {
+      out.push({ name: 'blow', at: at(moment.touches[0], 'point'), text: `impact ${told.blow_Ns.toPrecision(2)} Ns`,
+                 colour: '--soft', beside: [18, -34], yields: true });
+    }
     if (told.hand_N > 0.3) {
       out.push({ name: 'hand', at: proxy.clone().sub(this.arrowOf(moment, 'force')), text: text(told.hand_N),
                  colour: '--hand', beside: [14, 6] });

@@ -3,12 +3,14 @@
 
 const element = (id) => document.getElementById(id);
 
+// Label, meaning, line, the phases in which it can be given, and why not in others (CycleStatus::refusal has the last
+// word: it knows causes that last and the enabling input as well).
 const ORDERS = [
-  ['hold', 'stop the arm, its drives enabled', 'hold'],
-  ['resume', 'go on out of a hold', 'resume'],
-  ['release', 'out of a hold: let the arm follow the hand slowly', 'release'],
-  ['back off 20 mm', 'out of a hold: away from what was touched last', 'back-off 20mm'],
-  ['reset', 'after a fault: enable the drives again, into a hold', 'reset'],
+  ['hold', 'stop the arm, its drives enabled', 'hold', ['rendering', 'freeing'], 'the arm isn’t moving'],
+  ['resume', 'go on out of a hold', 'resume', ['holding'], 'the arm isn’t in a hold'],
+  ['release', 'out of a hold: let the arm follow the hand slowly', 'release', ['holding'], 'the arm isn’t in a hold'],
+  ['back off 20 mm', 'out of a hold: away from what was touched last', 'back-off 20mm', ['holding'], 'the arm isn’t in a hold'],
+  ['reset', 'after a fault: enable the drives again, into a hold', 'reset', ['faulted'], 'no stop by a fault waits for it'],
 ];
 
 const number = (value) => String(Number(value.toPrecision(9)));
@@ -61,13 +63,15 @@ export class Control {
     this.connection = connection;
     this.over = false;
     element('control').hidden = false;
-    element('orders').replaceChildren(...ORDERS.map(([label, title, line]) => {
+    this.phases = stage.words.phases.map((phase) => phase.name);
+    this.orders = ORDERS.map(([label, title, line]) => {
       const button = document.createElement('button');
       Object.assign(button, { textContent: label, title });
       button.dataset.line = line;
       button.addEventListener('click', () => this.ask(line));
       return button;
-    }));
+    });
+    element('orders').replaceChildren(...this.orders);
     this.settings = stage.settings;
     this.fields = parametersOf(stage).map((parameter) => this.makeField(parameter));
     element('parameters').replaceChildren(...this.fields.map((field) => field.box));
@@ -80,9 +84,25 @@ export class Control {
     for (const { parameter, show } of this.fields) if (parameter.of(settings) !== parameter.of(before)) show();
   }
 
+  // What can't be ordered now is disabled, and why stands below, once for all that have the same reason.
+  show({ phase }) {
+    const now = this.phases[phase];
+    if (this.over || now === this.phase) return;
+    this.phase = now;
+    const reasons = new Map();
+    ORDERS.forEach(([label, title, , phases, reason], i) => {
+      const possible = phases.includes(now);
+      this.orders[i].disabled = !possible;
+      this.orders[i].title = possible ? title : `${title}; not now: ${reason}`;
+      if (!possible) reasons.set(reason, [...(reasons.get(reason) ?? []), label]);
+    });
+    element('not-now').textContent = [...reasons].map(([reason, labels]) => `${labels.join(', ')}: ${reason}`).join('; ');
+  }
+
   // After the session nothing can be changed.
   end() {
     this.over = true;
+    element('not-now').textContent = '';
     element('control-over').hidden = false;
     for (const input of element('control').querySelectorAll('button, input')) input.disabled = true;
   }

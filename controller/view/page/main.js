@@ -1,7 +1,9 @@
 // Puts the page together: what comes from the session goes to the picture, the plots and the panel.
 import { Connection } from './connection.js';
 import { Control } from './control.js';
+import { Felt } from './felt.js';
 import { Keys } from './keys.js';
+import { Microscope } from './microscope.js';
 import { Panel } from './panel.js';
 import { Player } from './player.js';
 import { Plots } from './plots.js';
@@ -13,8 +15,9 @@ const element = (id) => document.getElementById(id);
 const world = new World(element('picture'), element('labels'));
 const plots = new Plots(element('plots'));
 const panel = new Panel();
+const microscope = new Microscope(element('microscope'));
 const keys = new Keys();
-let stage = null, built = false, newest = null, control = null, player = null;
+let stage = null, built = false, newest = null, control = null, player = null, felt = null;
 
 const connection = new Connection({
   stage: (value) => {
@@ -22,6 +25,7 @@ const connection = new Connection({
     built = false;
     panel.introduce(stage);
     plots.introduce(stage);
+    felt = new Felt(element('felt'), stage);
     document.body.dataset.mode = stage.mode;
     const chip = element('mode-chip');
     chip.hidden = false;
@@ -64,6 +68,8 @@ function frame(now) {
     }
     world.show(newest);
     panel.show(newest);
+    microscope.show(newest);
+    control?.show(newest);
     newest = null;
     performance.mark('first-moment');
   }
@@ -72,6 +78,7 @@ function frame(now) {
   world.tell(panel.told);
   world.draw();
   plots.draw(now);
+  felt?.draw(now, plots.rows);
 }
 requestAnimationFrame(frame);
 
@@ -80,15 +87,21 @@ function setFollow(on) {
   element('follow').setAttribute('aria-pressed', String(on));
 }
 
+function toggleMicroscope() {
+  element('microscope-button').setAttribute('aria-pressed', String(microscope.toggle()));
+}
+
 for (const button of document.querySelectorAll('[data-view]')) {
   button.addEventListener('click', () => world.look(button.dataset.view));
 }
 element('follow').addEventListener('click', () => setFollow(!world.follow));
+element('microscope-button').addEventListener('click', toggleMicroscope);
 element('theme').addEventListener('click', toggleTheme);
 for (const [key, view] of [['0', 'overview'], ['1', 'top'], ['2', 'front'], ['3', 'side'], ['4', 'tool']]) {
   keys.add(key, `look: ${view}`, () => world.look(view));
 }
 keys.add('f', 'follow the tool', () => setFollow(!world.follow));
+keys.add('m', 'the touch, enlarged', toggleMicroscope);
 keys.add('d', 'dark or light', toggleTheme);
 const TURN = Math.PI / 36, SHIFT = 0.04, CLOSER = 0.9;  // of a key that is pressed once
 for (const [key, aside, up] of [['ArrowLeft', -1, 0], ['ArrowRight', 1, 0], ['ArrowUp', 0, 1], ['ArrowDown', 0, -1]]) {
@@ -102,4 +115,4 @@ keys.add('=', '', () => world.zoom(CLOSER));
 keys.add('-', 'further away', () => world.zoom(1 / CLOSER), '−');
 
 // For tests and for the curious.
-globalThis.proxarm = { world, plots, panel, connection, get control() { return control; }, get stage() { return stage; }, get player() { return player; } };
+globalThis.proxarm = { world, plots, panel, microscope, get felt() { return felt; }, connection, get control() { return control; }, get stage() { return stage; }, get player() { return player; } };

@@ -1,7 +1,7 @@
 // The scene's objects: planes as grids with their free side, solids, meshes, skins, media, guides.
 import * as THREE from './three/build/three.module.js';
 import { UP, Arrow, capsuleGeometry, cylinderGeometry, fetchMesh, lineOf, placeBetween, setPose, vec } from './shapes.js';
-import { colour, isDark, onTheme } from './theme.js';
+import { colour, onTheme } from './theme.js';
 
 const PLANE_SIZE = 1.1, PLANE_CELL = 0.1, HATCH = 0.045, MEDIUM_DEPTH = 0.2;
 
@@ -21,15 +21,14 @@ function makeMaterials() {
     free: new THREE.MeshLambertMaterial(),
   };
   onTheme(() => {
-    const dark = isDark();
     const green = new THREE.Color(colour('--good'));
-    all.solid.color.set(dark ? 0x4c8f78 : 0x86bda8);
-    for (const name of ['cavity', 'sheet']) all[name].color.set(dark ? 0x3f8f73 : 0x6fb59a);
-    all.skin.color.set(dark ? 0xd8b04a : 0xe2b64b);
-    all.skinEdge.color.set(dark ? 0xd8b04a : 0x8a6410);
-    all.medium.color.set(dark ? 0x7d8fd6 : 0x8b9be0);
+    all.solid.color.set(colour('--solid'));
+    for (const name of ['cavity', 'sheet']) all[name].color.set(colour('--cavity'));
+    all.skin.color.set(colour('--skin'));
+    all.skinEdge.color.set(colour('--skin-edge'));
+    all.medium.color.set(colour('--medium'));
     for (const name of ['grid', 'border', 'guide', 'free']) all[name].color.copy(green);
-    all.edge.color.set(dark ? 0x9be0c5 : 0x1f5c47);
+    all.edge.color.set(colour('--solid-edge'));
   });
   return all;
 }

@@ -30,6 +30,7 @@ const SESSION_FIGURES = [
   ['hand’s torque', (m) => newtonMetres(m, 'torque'), feelsTorque],
   ['force of contact', (m) => (m.contact ? newtons(m.contact_N) : '—')],
   ['torque of contact', (m) => (m.contact ? newtonMetres(m, 'contact_torque') : '—'), feelsTorque],
+  ['last impact', (m) => (m.blow_Ns > 0 ? `${m.blow_Ns.toPrecision(3)} Ns` : '—'), (m) => Number.isFinite(m.blow_Ns)],
   ['touches', (m, stage) => (m.contact ? name(stage, m) : 'nothing')],
   ['friction μ', (m) => (m.contact ? m.friction.toFixed(3) : '—')],
   ['proxy to surface', (m) => length(m.proxy_clearance_m)],
@@ -37,9 +38,21 @@ const SESSION_FIGURES = [
   ['tool to proxy', (m) => length(Math.hypot(m.tool_x - m.proxy_x, m.tool_y - m.proxy_y, m.tool_z - m.proxy_z))],
   ['mass felt, wanted', (m) => (m.mass_kg > 0 ? `${m.mass_kg.toFixed(2)} kg` : '—')],
   ['inertia felt', (m) => `${m.inertia_kg_m2.toPrecision(3)} kg m²`, turns],
+  ['smallest stable', (m) => overSmallest(marginAt(m)), (m) => Boolean(marginAt(m)) && m.mass_kg > 0],
   ['damping', (m) => `${m.damping_Ns_per_m.toFixed(1)} Ns/m`],
   ['timestep', (m) => `${(1e3 * m.period_s).toFixed(2)} ms`],
 ];
+
+// How far from swinging: what is felt over the smallest mass that is stable where the arm last came by a new place, as the
+// session judges it. Live it comes with the status, of a record with the stage.
+let margins = [];
+const marginAt = (moment) => margins.filter((margin) => margin.time_s <= moment.time_s + 1e-9).pop();
+export function overSmallest(margin) {
+  const { felt_mass_kg: felt, smallest_stable_mass_kg: smallest } = margin;
+  if (smallest === null) return '! none is stable';
+  const ratio = felt / smallest;
+  return `${ratio < 1 ? '! ' : ''}${smallest.toPrecision(2)} kg (${ratio.toFixed(2)} ×)`;
+}
 
 // Of the simulated arm alone.
 const ARM_FIGURES = [
@@ -77,6 +90,7 @@ export class Panel {
 
   introduce(stage) {
     this.stage = stage;
+    margins = stage.record?.margins ?? [];
     this.figures = stage.mode === 'arm' ? ARM_FIGURES : SESSION_FIGURES;
     element('figures').replaceChildren();
     this.cells = this.figures.map(([label]) => {
@@ -96,6 +110,8 @@ export class Panel {
   }
 
   status(status) {
+    const { margin } = status, last = margins[margins.length - 1];
+    if (margin && last?.time_s !== margin.time_s) margins.push(margin);
     element('fault').hidden = !status.fault;
     element('fault').textContent = status.fault;
     element('phase-chip').dataset.fault = String(Boolean(status.fault));
@@ -152,6 +168,7 @@ export class Panel {
       const { term, value } = this.cells[i];
       term.hidden = value.hidden = Boolean(there) && !there(this.moment, this.stage);
       value.textContent = value.hidden ? '' : text(this.moment, this.stage);
+      value.classList.toggle('bad', value.textContent.startsWith('!'));
     });
   }
 

@@ -1,7 +1,8 @@
 // The last 20 s in four plots: forces, the way to the nearest surface, mass and energy, the cycle's computing time.
 // While something is touched the ground is shaded: plain where it sticks, hatched where it slips.
 import { PHASE_RENDERING } from './connection.js';
-import { colour, onTheme } from './theme.js';
+import { evenForce } from './felt.js';
+import { colour, dash, onTheme } from './theme.js';
 
 const WINDOW_S = 20;
 const MOST_ROWS = 1500;
@@ -18,27 +19,25 @@ const LINEAR_MM = 0.05;
 const bent = (mm) => Math.asinh(mm / LINEAR_MM);
 const BENT_TICKS_MM = [-10, -1, -0.1, 0, 0.1, 1, 10, 100];
 
-const DASH = { solid: [], dashed: [7, 4], dotted: [2, 3] };
-
 const moved = (m, value) => (m.phase >= PHASE_RENDERING ? value : NaN);
 
 // Lines may leave the plot at its top for a moment: a blow of a millisecond would flatten all else. There stands how
 // high they go.
 const SESSION_PLOTS = [
   { title: 'force', unit: 'N', least: 5, zero: true, lines: [
-    { name: 'peaks', value: (m) => moved(m, m.contact_peak_N), colour: '--soft', dash: 'dotted', peaks: true },
-    { name: 'contact', value: (m) => moved(m, m.contact_N), colour: '--stick', dash: 'solid' },
-    { name: 'hand', value: (m) => moved(m, m.hand_N), colour: '--hand', dash: 'dashed' }] },
+    { name: 'peaks', value: (m) => moved(m, m.contact_peak_N), as: 'peaks', peaks: true },
+    { name: 'hand', value: (m) => moved(m, m.hand_N), as: 'hand' },
+    { name: 'contact', value: (m) => moved(m, m.contact_N), as: 'contact' }] },
   { title: 'to the surface', unit: 'mm', bent: true, lines: [
-    { name: 'proxy', value: (m) => moved(m, 1e3 * m.proxy_clearance_m), colour: '--proxy', dash: 'solid' },
-    { name: 'tool', value: (m) => moved(m, 1e3 * m.tool_clearance_m), colour: '--tool', dash: 'dashed' }] },
+    { name: 'tool', value: (m) => moved(m, 1e3 * m.tool_clearance_m), as: 'tool' },
+    { name: 'proxy', value: (m) => moved(m, 1e3 * m.proxy_clearance_m), as: 'proxy' }] },
   { title: 'mass, energy', unit: 'kg · J', least: 1, zero: true, lines: [
-    { name: 'wanted', value: (m) => (m.mass_kg > 0 ? m.mass_kg : NaN), colour: '--ink', dash: 'dotted' },
-    { name: 'felt', value: (m) => m.felt_kg, colour: '--good', dash: 'solid' },
-    { name: 'energy', value: (m) => m.energy_hand_J, colour: '--hand', dash: 'dashed' }] },
+    { name: 'wanted', value: (m) => (m.mass_kg > 0 ? m.mass_kg : NaN), as: 'wanted' },
+    { name: 'felt', value: (m) => m.felt_kg, as: 'felt' },
+    { name: 'energy', value: (m) => m.energy_hand_J, as: 'energy' }] },
   { title: 'computing a cycle', unit: 'µs', least: 10, zero: true, lines: [
-    { name: 'longest', value: (m) => m.compute_peak_us, colour: '--soft', dash: 'dotted', peaks: true },
-    { name: 'last', value: (m) => m.compute_us, colour: '--accent', dash: 'solid' }],
+    { name: 'longest', value: (m) => m.compute_peak_us, as: 'peaks', peaks: true },
+    { name: 'last', value: (m) => m.compute_us, as: 'computing' }],
     live: true, note: overrunNote },
 ];
 
@@ -54,12 +53,12 @@ function overrunNote(rows) {
 // Of the simulated arm alone, whose hand and sensor are what they are whatever its drives do.
 const ARM_PLOTS = [
   { title: 'force', unit: 'N', least: 5, zero: true, lines: [
-    { name: 'on the sensor', value: (m) => m.sensor_N, colour: '--stick', dash: 'solid' },
-    { name: 'hand', value: (m) => m.hand_N, colour: '--hand', dash: 'dashed' }] },
+    { name: 'hand', value: (m) => m.hand_N, as: 'hand' },
+    { name: 'on the sensor', value: (m) => m.sensor_N, as: 'contact' }] },
   { title: 'tool’s speed', unit: 'mm/s', least: 10, zero: true, lines: [
-    { name: 'tool', value: (m) => m.speed_mm_per_s, colour: '--tool', dash: 'solid' }] },
+    { name: 'tool', value: (m) => m.speed_mm_per_s, as: 'tool' }] },
   { title: 'mass felt', unit: 'kg', least: 1, zero: true, lines: [
-    { name: 'in free motion', value: (m) => m.felt_kg, colour: '--good', dash: 'solid' }] },
+    { name: 'in free motion', value: (m) => m.felt_kg, as: 'felt' }] },
 ];
 
 // Mass that the hand feels, by its force over the tool's acceleration along it: a running fit over about half a second of
@@ -88,16 +87,18 @@ class FeltMass {
     this.forceTimesA *= keep;
     this.aTimesA *= keep;
     if (a.contact === 0 && c.contact === 0 && (this.anyMass || c.mass_kg > 0) && h1 > 0 && h2 > 0) {
-      for (const axis of ['x', 'y', 'z']) {
-        const p = `tool_${axis}`, f = `force_${axis}`;
+      const force = evenForce(this.rows);
+      ['x', 'y', 'z'].forEach((axis, k) => {
+        const p = `tool_${axis}`;
         const acceleration = 2 * ((c[p] - b[p]) / h2 - (b[p] - a[p]) / h1) / (h1 + h2);
-        const mean = this.rows.reduce((sum, row) => sum + row[f], 0) / this.rows.length;
-        this.forceTimesA += mean * acceleration;
+        this.forceTimesA += force[k] * acceleration;
         this.aTimesA += acceleration * acceleration;
-      }
+      });
     }
     const known = this.aTimesA > 0.5 && a.contact === 0 && c.contact === 0;
-    return known ? Math.min(200, Math.max(0, this.forceTimesA / this.aTimesA)) : NaN;
+    // The sensor doesn't see what moves the handle before it.
+    const handle_kg = this.anyMass ? 0 : c.handle_kg;
+    return known ? Math.min(200, Math.max(0, handle_kg + this.forceTimesA / this.aTimesA)) : NaN;
   }
 }
 
@@ -121,6 +122,12 @@ class Plot {
     box.append(this.canvas);
     parent.append(box);
     this.context = this.canvas.getContext('2d');
+    this.values = document.createElement('div');
+    this.values.className = 'values';
+    this.values.hidden = true;
+    box.append(this.values);
+    box.addEventListener('pointermove', (event) => { this.pointer = event.offsetX; this.stale = true; });
+    box.addEventListener('pointerleave', () => { this.pointer = undefined; this.stale = true; });
     new ResizeObserver(() => this.resize()).observe(box);
   }
 
@@ -207,6 +214,31 @@ class Plot {
       c.stroke();
     }
     this.drawHead();
+    this.tellPointed(rows, from, to, x);
+  }
+
+  // The values under the pointer, of the row that is nearest to it.
+  tellPointed(rows, from, to, x) {
+    const inside = this.pointer >= LEFT && this.pointer <= this.width - RIGHT && rows.length > 0;
+    this.values.hidden = !inside;
+    if (!inside) return;
+    const time = from + ((this.pointer - LEFT) / (this.width - LEFT - RIGHT)) * (to - from);
+    const row = rows.reduce((best, one) => (Math.abs(one.time_s - time) < Math.abs(best.time_s - time) ? one : best));
+    const { unit, lines } = this.description, c = this.context;
+    const told = lines.map((line) => [line.name, line.value(row)]).filter(([, value]) => Number.isFinite(value));
+    this.values.textContent = [`${row.time_s.toFixed(3)} s`, ...told.map(([name, value]) => `${name} ${Number(value.toPrecision(4))}`)]
+      .join('\n') + (told.length ? ` ${unit}` : '');
+    c.strokeStyle = colour('--ink');
+    c.lineWidth = 1;
+    c.setLineDash(dash('peaks'));
+    c.beginPath();
+    c.moveTo(x(row.time_s), this.top);
+    c.lineTo(x(row.time_s), this.height - BOTTOM);
+    c.stroke();
+    c.setLineDash([]);
+    const right = x(row.time_s) > this.width / 2;
+    this.values.style.left = right ? '' : `${x(row.time_s) + 6}px`;
+    this.values.style.right = right ? `${this.width - x(row.time_s) + 6}px` : '';
   }
 
   shade(rows, x) {
@@ -278,9 +310,9 @@ class Plot {
 
   line(line, rows, x, y) {
     const c = this.context;
-    c.strokeStyle = colour(line.colour);
+    c.strokeStyle = colour(`--line-${line.as}`);
     c.lineWidth = 1.8;
-    c.setLineDash(DASH[line.dash]);
+    c.setLineDash(dash(line.as));
     c.beginPath();
     let down = false;
     for (const row of rows) {
@@ -353,8 +385,8 @@ class Plot {
     for (const { text, font, line, x, row } of this.head) {
       const y = 12 + row * HEAD_ROW;
       if (line) {
-        c.strokeStyle = colour(line.colour);
-        c.setLineDash(DASH[line.dash]);
+        c.strokeStyle = colour(`--line-${line.as}`);
+        c.setLineDash(dash(line.as));
         c.beginPath();
         c.moveTo(x, y);
         c.lineTo(x + SAMPLE, y);

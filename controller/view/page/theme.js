@@ -28,6 +28,12 @@ export function colour(name) {
   return colours.get(name);
 }
 
+// The dash of a line of the table, in pixels: dash('proxy').
+export function dash(line) {
+  const lengths = colour(`--dash-${line}`).split(' ').map(Number);
+  return lengths[0] > 0 ? lengths : [];
+}
+
 function apply() {
   document.documentElement.dataset.theme = isDark() ? 'dark' : 'light';
   colours.clear();

@@ -6,7 +6,7 @@ import { ContactView } from './contacts.js';
 import { LimitsView } from './limits.js';
 import { SceneView } from './objects.js';
 import { vector } from './connection.js';
-import { colour, isDark, onTheme } from './theme.js';
+import { colour, onTheme } from './theme.js';
 
 const SLOW_FRAME_MS = 32, FAST_FRAME_MS = 20;
 const RATIOS = [1, 0.8, 0.65, 0.5];
@@ -80,7 +80,7 @@ export class World {
     this.floor.material.opacity = 0.55;
     this.scene.add(this.floor);
     onTheme(() => {
-      const paint = new THREE.Color(isDark() ? 0x3a4653 : 0xb3bdc7), colours = this.floor.geometry.attributes.color;
+      const paint = new THREE.Color(colour('--floor')), colours = this.floor.geometry.attributes.color;
       for (let i = 0; i < colours.count; ++i) colours.setXYZ(i, paint.r, paint.g, paint.b);
       colours.needsUpdate = true;
     });
@@ -244,7 +244,7 @@ export class World {
         element.textContent = label.text;
         this.labelWidths.set(label.name, element.offsetWidth);
       }
-      element.style.color = colour(label.colour);
+      element.style.borderColor = colour(label.colour);
       const x = Math.min(width - this.labelWidths.get(label.name) - 4, Math.max(4, (0.5 + p.x / 2) * width + label.beside[0]));
       const y = Math.min(height - 26, Math.max(4, (0.5 - p.y / 2) * height + label.beside[1]));
       const box = [x, y, x + this.labelWidths.get(label.name), y + LABEL_HEIGHT];

@@ -39,7 +39,9 @@ Moment LiveSource::take() {
 
 std::string LiveSource::encode(const Moment& moment) {
   stage_.place(moment.record, moment.rendered_s, links_, objects_);
-  return encode_moment(moment, links_, objects_);
+  Moment turned = moment;
+  turned.tool_q = models::Quaternion(stage_.tool_pose(links_).linear());
+  return encode_moment(turned, links_, objects_);
 }
 
 void LiveSource::remember(const Moment& moment) {

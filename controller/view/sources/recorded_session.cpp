@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <limits>
 
 #include "controller/view/stage/words.hpp"
 #include "models/files/json.hpp"
@@ -90,6 +91,7 @@ void RecordedSession::find_events() {
   fault_at_ = size();
   rendered_ns_.reserve(size());
   time_ns_.reserve(size());
+  touch_begins_.assign(size(), std::numeric_limits<std::uint32_t>::max());
   for (std::size_t i = 0; i < size(); ++i) {
     const CycleRecord record = signals_.row(i);
     if (i > 0 && last.phase == Phase::rendering) rendered += record.time_ns - last.time_ns;
@@ -97,6 +99,7 @@ void RecordedSession::find_events() {
     time_ns_.push_back(record.time_ns);
     if (record.phase != last.phase) add(RecordedEvent::Kind::phase, i, record, phase_words(record.phase).words);
     if (record.contact != controller::ContactPhase::free) {
+      touch_begins_[i] = i > 0 && touch_begins_[i - 1] < i ? touch_begins_[i - 1] : static_cast<std::uint32_t>(i);
       if (record.time_ns - touched_ns >= apart_ns) add(RecordedEvent::Kind::contact, i, record, "touches");
       touched_ns = record.time_ns;
       if (i == 0 || last.contact == controller::ContactPhase::free) since_ns = record.time_ns;
@@ -162,11 +165,30 @@ Moment RecordedSession::moment(std::size_t index) const {
   moment.flags_since = moment.record.flags;
   moment.hand_peak_N = controller::vec3(moment.record.force_W_N).norm();
   moment.contact_peak_N = controller::vec3(moment.record.contact_force_W_N).norm();
+  moment.blow = blow_before(index);
   return moment;
 }
 
+// Of the touch that a cycle belongs to, or of one that ended within the last second.
+Blow RecordedSession::blow_before(std::size_t index) const {
+  constexpr std::size_t most = 1000;
+  const auto touches = [this](std::size_t i) { return touch_begins_[i] <= i; };
+  std::size_t at = index;
+  while (at > 0 && index - at < most && !touches(at)) --at;
+  Blow blow;
+  if (!touches(at)) return blow;
+  const std::size_t first = touch_begins_[at];
+  for (std::size_t i = first > 0 ? first - 1 : first; i <= at; ++i) {
+    controller::CycleRecord record = signals_.row(i);
+    if (record.time_ns - time_ns_[first] > Blow::lasts_ns) break;
+    record.period_ns = i > 0 ? record.time_ns - time_ns_[i - 1] : 0;
+    blow.add(record);
+  }
+  return blow;
+}
+
 std::string RecordedSession::encode(std::size_t index) const {
-  const Moment shown = moment(index);
+  Moment shown = moment(index);
   std::vector<models::Pose> links, objects;
   std::vector<models::Vec3> driven;
   const std::size_t count = stage_.scene().objects.size();
@@ -175,6 +197,7 @@ std::string RecordedSession::encode(std::size_t index) const {
     driven.emplace_back(p[0], p[1], p[2]);
   }
   stage_.place(shown.record, shown.rendered_s, links, objects, driven);
+  shown.tool_q = models::Quaternion(stage_.tool_pose(links).linear());
   return encode_moment(shown, links, objects);
 }
 

@@ -54,14 +54,16 @@ class RecordedSession {
   void find_events();
   void index_frames();
   void follow_driven();
+  [[nodiscard]] Blow blow_before(std::size_t index) const;
 
   Stage& stage_;
   controller::ReplayReader log_;
   SignalsFile signals_;
   ContactsFile contacts_;
-  std::uint64_t first_cycle_ = 0;                   // number of the first row's cycle
-  std::vector<std::int64_t> time_ns_;               // of each cycle
-  std::vector<std::int64_t> rendered_ns_;           // time rendered before each cycle, since the record's beginning
+  std::uint64_t first_cycle_ = 0;            // number of the first row's cycle
+  std::vector<std::int64_t> time_ns_;        // of each cycle
+  std::vector<std::uint32_t> touch_begins_;  // of each cycle, the first of its touch; the largest: it touches nothing
+  std::vector<std::int64_t> rendered_ns_;    // time rendered before each cycle, since the record's beginning
   std::vector<controller::ReplayPlace> positions_;  // of each cycle in the log, from its first one on
   std::vector<std::array<float, 3>> driven_m_;      // of each cycle and object; empty if no object is driven
   std::vector<RecordedEvent> events_;

@@ -177,6 +177,13 @@ SignalsFile::Column SignalsFile::column_named(std::string_view name, const std::
       return {[](CycleRecord& r, std::size_t at, const Field& f) { r.proxy_q_W[at] = number_of<double>(f); }, part};
     }
   }
+  constexpr std::array<std::string_view, 4> of_steel{"true_tool_W_qx", "true_tool_W_qy", "true_tool_W_qz",
+                                                     "true_tool_W_qw"};
+  for (std::size_t part = 0; part < of_steel.size(); ++part) {
+    if (name == of_steel[part]) {
+      return {[](CycleRecord& r, std::size_t at, const Field& f) { r.true_tool_q_W[at] = number_of<double>(f); }, part};
+    }
+  }
   const OtherColumn other = column_of_other(name);
   return {other.store, other.part};
 }

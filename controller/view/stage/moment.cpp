@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <limits>
 
 namespace proxarm::view {
 namespace {
 
 using controller::CycleRecord;
 using controller::Triple;
+using models::Vec3;
 
 // A field: its name and how its number is computed.
 struct Field {
@@ -38,6 +40,7 @@ constexpr std::array fields{
     Field{
         "mass_kg",
         [](const Moment& m) { return m.record.proxy_mass_kg > 0.0 ? m.record.proxy_mass_kg + m.handle_mass_kg : 0.0; }},
+    Field{"handle_kg", [](const Moment& m) { return m.handle_mass_kg; }},
     Field{"inertia_kg_m2", [](const Moment& m) { return m.record.proxy_inertia_kg_m2; }},
     Field{"damping_Ns_per_m", [](const Moment& m) { return m.record.proxy_damping_Ns_per_m; }},
     Field{"energy_hand_J", [](const Moment& m) { return m.record.energies_J.hand; }},
@@ -49,6 +52,8 @@ constexpr std::array fields{
     Field{"hand_peak_N", [](const Moment& m) { return m.hand_peak_N; }},
     Field{"contact_N", [](const Moment& m) { return norm(m.record.contact_force_W_N); }},
     Field{"contact_peak_N", [](const Moment& m) { return m.contact_peak_N; }},
+    Field{"blow_Ns", [](const Moment& m) { return m.blow.impulse_Ns(); }},
+    Field{"blow_s", [](const Moment& m) { return m.blow.begun_s(); }},
 };
 
 // A vector: one name, three numbers.
@@ -97,6 +102,7 @@ void MomentBuilder::add(const CycleRecord& record, double rendered_s) noexcept {
   next_.compute_peak_us = std::max(next_.compute_peak_us, 1e-3 * static_cast<double>(record.compute_ns));
   next_.hand_peak_N = std::max(next_.hand_peak_N, norm(record.force_W_N));
   next_.contact_peak_N = std::max(next_.contact_peak_N, norm(record.contact_force_W_N));
+  next_.blow.add(record);
   if (record.has(controller::RecordFlag::overrun)) ++next_.overruns;
 }
 
@@ -126,16 +132,30 @@ void append_fields(std::vector<double>& row, const Moment& moment) {
 }
 
 const std::vector<std::string>& contact_field_names() {
-  static const std::vector<std::string> names{"object",   "part",    "slips",   "friction", "gap_m",
-                                              "point_x",  "point_y", "point_z", "normal_x", "normal_y",
-                                              "normal_z", "force_x", "force_y", "force_z"};
+  static const std::vector<std::string> names{
+      "object",   "part",    "slips",   "friction", "gap_m",  "point_x", "point_y", "point_z", "normal_x", "normal_y",
+      "normal_z", "force_x", "force_y", "force_z",  "tool_x", "tool_y",  "tool_z",  "steel_x", "steel_y",  "steel_z"};
   return names;
 }
 
 namespace {
 
+// How far the point of a rigid tool that lies at `point` while the tool is at the proxy's pose lies from there while
+// the tool is at another one, in W. A tool that isn't turned has the proxy's orientation.
+Vec3 moved_with(const CycleRecord& record, const Vec3& point, const Vec3& place,
+                const models::Quaternion& orientation) {
+  const Vec3 proxy = controller::vec3(record.proxy_W_m), arm = point - proxy;
+  if (!(record.proxy_inertia_kg_m2 > 0.0)) return place - proxy;
+  const models::Quaternion turn = orientation * models::Quaternion(record.proxy_q_W.data()).conjugate();
+  return place - proxy + (turn * arm - arm);
+}
+
 // In the order of contact_field_names().
-void append_contacts(std::vector<double>& row, const CycleRecord& record) {
+void append_contacts(std::vector<double>& row, const Moment& moment) {
+  const CycleRecord& record = moment.record;
+  // Where the steel is, only a simulation knows, and its record.
+  const Vec3 steel = controller::vec3(record.true_tool_W_m);
+  const bool is_known = steel.norm() > 0.0;
   row.push_back(static_cast<double>(record.recorded_contacts()));
   for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
     const controller::RecordedContact& contact = record.contacts[i];
@@ -145,6 +165,11 @@ void append_contacts(std::vector<double>& row, const CycleRecord& record) {
     for (const Triple* vector : {&contact.point_W_m, &contact.normal_W, &contact.force_W_N}) {
       row.insert(row.end(), vector->begin(), vector->end());
     }
+    const Vec3 point = controller::vec3(contact.point_W_m);
+    const Vec3 by_encoders = moved_with(record, point, controller::vec3(record.tool_W_m), moment.tool_q);
+    Vec3 truly = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+    if (is_known) truly = moved_with(record, point, steel, models::Quaternion(record.true_tool_q_W.data()));
+    for (const Vec3& vector : {by_encoders, truly}) row.insert(row.end(), vector.begin(), vector.end());
   }
 }
 
@@ -154,7 +179,7 @@ std::string encode_moment(const Moment& moment, std::span<const models::Pose> li
                           std::span<const models::Pose> objects) {
   std::vector<double> row{kind_moment};
   append_fields(row, moment);
-  append_contacts(row, moment.record);
+  append_contacts(row, moment);
   std::string bytes;
   append<double>(bytes, row);
   for (const models::Pose& X : links) append_pose(bytes, X);

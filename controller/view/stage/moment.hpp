@@ -16,7 +16,9 @@
 #include <vector>
 
 #include "controller/record/black_box.hpp"
+#include "controller/view/stage/blow.hpp"
 #include "models/geometry/geometry.hpp"
+#include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::view {
 
@@ -32,6 +34,8 @@ struct Moment {
   double hand_peak_N = 0.0;       // the hand's largest force
   double contact_peak_N = 0.0;    // the world's largest force
   std::uint64_t overruns = 0;     // since the session began
+  Blow blow;                      // of the last touch
+  models::Quaternion tool_q = models::Quaternion::Identity();  // of the tool in W, by the encoders
 };
 
 // Accumulates what happens between two moments.

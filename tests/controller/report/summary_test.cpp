@@ -318,5 +318,28 @@ TEST(Summary, JsonHasTheKeysThatProgramsReadAndOnlyRepeatableOnesInTheRecord) {
   EXPECT_NE(timing_json(s), timing_json(slower));
 }
 
+TEST(Summary, InBriefTellsWhatWentWrongAndNothingElse) {
+  Summary s = Session{}.run();
+  const SummaryLook brief{.verbose = false};
+  EXPECT_EQ(summary_text(s, brief).find("FAULT"), std::string::npos);
+  EXPECT_LE(summary_text(s, brief).size(), summary_text(s).size() / 2);
+  s.idle_orders = {{"resume", 2.0, "the arm isn't in a hold"}};
+  EXPECT_NE(summary_text(s, brief).find("order without effect"), std::string::npos);
+  EXPECT_STREQ(judge(s).word, "look");
+  s.faults = {{Fault::sensor_lost, 17, "sensor: lost"}};
+  EXPECT_NE(summary_text(s, brief).find("FAULT:                    sensor: lost\n"), std::string::npos);
+  EXPECT_STREQ(judge(s).word, "fault");
+  EXPECT_NE(summary_text(s, {.verbose = false, .colour = true}).find("\x1b[1;31msensor: lost\x1b[0m"),
+            std::string::npos);
+}
+
+TEST(Summary, DampingBelowZeroIsToldAsWhatItDoes) {
+  Summary s = Session{}.run();
+  s.apparent_damping_Ns_per_m = -0.67;
+  EXPECT_NE(summary_text(s).find("the loop's delay pushes on by 0.67 Ns/m"), std::string::npos);
+  s.apparent_damping_Ns_per_m = 20.0;
+  EXPECT_NE(summary_text(s).find("; damping 20.00 Ns/m"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace proxarm::controller

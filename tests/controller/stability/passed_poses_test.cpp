@@ -71,6 +71,23 @@ class PassedPosesTest : public ::testing::Test {
   LoopModel loop_;
 };
 
+TEST_F(PassedPosesTest, HowFarFromSwingingItIsIsFoundWhereItIsAskedFor) {
+  const Vec3 away(0.25, 0.0, 0.0);
+  const double felt_kg = 2.0 * least_kg_at(joints_at(away));
+  PassedPoses silent(arm_, cell_, hand_, loop_), asked(arm_, cell_, hand_, loop_);
+  asked.find_smallest();
+  for (PassedPoses* poses : {&silent, &asked}) {
+    EXPECT_FALSE(pass(*poses, 1.0, Vec3::Zero(), felt_kg));
+    EXPECT_FALSE(pass(*poses, 2.0, away, felt_kg));
+  }
+  EXPECT_TRUE(silent.places().empty());
+  ASSERT_EQ(asked.places().size(), 2U);
+  EXPECT_EQ(asked.places()[1].time_s, 2.0);
+  EXPECT_EQ(asked.places()[1].felt_mass_kg, felt_kg);
+  EXPECT_NEAR(asked.places()[0].smallest_stable_mass_kg.value_or(0.0), least_kg_at(joints_at(Vec3::Zero())), 0.02);
+  EXPECT_NEAR(asked.places()[1].smallest_stable_mass_kg.value_or(0.0), 0.5 * felt_kg, 0.02);
+}
+
 TEST_F(PassedPosesTest, AMassThatIsStableAtTheStartIsToldWhereItIsNot) {
   const Vec3 away(0.25, 0.0, 0.0);
   const double at_start_kg = least_kg_at(arm_.start_rad()), away_kg = least_kg_at(joints_at(away));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "controller/view/stage/words.hpp"
@@ -77,6 +78,46 @@ TEST(Moment, KeepsThePeaksOfAllCyclesSinceTheLast) {
   EXPECT_EQ(moment.hand_peak_N, 2.0);
   EXPECT_EQ(moment.flags_since & static_cast<std::uint32_t>(controller::RecordFlag::limit_speed), 0U);
   EXPECT_EQ(moment.overruns, 1U);  // of the whole session
+}
+
+TEST(Moment, SaysWhereToolAndSteelAreBesideEachContact) {
+  Moment moment;
+  controller::CycleRecord& record = moment.record;
+  record.proxy_W_m = {0.5, 0.0, 0.5};
+  record.tool_W_m = {0.5, 0.0, 0.5 - 2e-5};
+  record.proxy_inertia_kg_m2 = 0.05;
+  record.contact_count = 1;
+  record.contacts[0].point_W_m = {0.6, 0.0, 0.5};
+  moment.tool_q = Eigen::AngleAxisd(1e-3, models::Vec3::UnitY());  // its far end goes down
+  const std::string bytes = encode_moment(moment, {}, {});
+  const std::size_t tool = 1 + field_names().size() + 1 + 14;
+  EXPECT_EQ(contact_field_names()[14], "tool_x");
+  EXPECT_NEAR(number_at(bytes, tool + 2), -2e-5 - 1e-4, 1e-9);
+  EXPECT_TRUE(std::isnan(number_at(bytes, tool + 5)));
+  record.true_tool_W_m = {0.5, 0.0, 0.5 - 3e-5};
+  EXPECT_NEAR(number_at(encode_moment(moment, {}, {}), tool + 5), -3e-5, 1e-12);
+  record.proxy_inertia_kg_m2 = 0.0;  // a tool that is held has the proxy's orientation
+  EXPECT_NEAR(number_at(encode_moment(moment, {}, {}), tool + 2), -2e-5, 1e-12);
+}
+
+// A proxy of 3.75 kg at 36 mm/s is stopped in a step of 1 ms, by 135 N; then the hand pushes with 2 N.
+TEST(Blow, IsTheImpulseOfATouchWhateverTheTimestep) {
+  for (const std::int64_t period_ns : {250'000, 1'000'000, 4'000'000}) {
+    Blow blow;
+    controller::CycleRecord record;
+    record.period_ns = period_ns;
+    EXPECT_TRUE(std::isnan(blow.impulse_Ns()) && std::isnan(blow.begun_s()));
+    for (int k = 0; k < 1000; ++k) {
+      record.time_ns = k * period_ns;
+      record.force_W_N = {0.0, 0.0, -2.0};
+      record.contact = k < 10 ? controller::ContactPhase::free : controller::ContactPhase::stick;
+      const double T = 1e-9 * static_cast<double>(period_ns);
+      record.contact_force_W_N = {0.0, 0.0, k < 10 ? 0.0 : k == 10 ? 2.0 + 3.75 * 0.036 / T : 2.0};
+      blow.add(record);
+    }
+    EXPECT_NEAR(blow.impulse_Ns(), 3.75 * 0.036, 1e-9);
+    EXPECT_NEAR(blow.begun_s(), 10e-9 * static_cast<double>(period_ns), 1e-12);
+  }
 }
 
 TEST(Moment, AHistorySaysHowManyRowsItHas) {

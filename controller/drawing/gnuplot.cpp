@@ -1,4 +1,4 @@
-#include "controller/report/gnuplot.hpp"
+#include "controller/drawing/gnuplot.hpp"
 
 #include <fcntl.h>
 #include <spawn.h>

@@ -1,0 +1,176 @@
+// Felt against meant, of the time that the plots show: the hand's force against the tool's acceleration in free motion,
+// beside that of the mass that was asked for; and the force of contact against how deep the tool is, beside what the
+// scene means there. The ground is what hands don't tell apart (docs/view.md has the sources).
+import { PHASE_RENDERING, vector } from './connection.js';
+import { colour, dash, onTheme } from './theme.js';
+
+export const NOTICEABLE = 0.1;       // of a force
+const RIGID_N_PER_MM = 42;           // what is stiffer is taken for rigid
+const BLOW_S = 0.05, GAP_S = 0.1;    // of a touch, what isn't in its work; rows that don't follow each other
+const LEAST_M_PER_S2 = 0.05;         // below, it is the encoders' noise
+const BETWEEN_MS = 250;
+const LEFT = 30, BOTTOM = 16, TOP = 18, RIGHT = 6;
+const FONT = '10px system-ui, "DejaVu Sans", sans-serif';
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const following = (a, b) => b.time_s > a.time_s && b.time_s - a.time_s < GAP_S;
+
+// The hand's force over nine rows, weighted as the second difference of places four rows apart weighs accelerations: by
+// a triangle. So neither is smoother than the other, and their ratio is the mass at any frequency.
+const TRIANGLE = [0, 1, 2, 3, 4, 3, 2, 1, 0].map((weight) => weight / 16);
+export function evenForce(rows) {
+  return ['force_x', 'force_y', 'force_z'].map((part) => rows.reduce((sum, row, i) => sum + TRIANGLE[i] * row[part], 0));
+}
+
+// Force along the acceleration against its size, over nine rows.
+export function freePoints(rows) {
+  const points = [];
+  for (let i = 8; i < rows.length; ++i) {
+    const [a, b, c] = [rows[i - 8], rows[i - 4], rows[i]];
+    if (!rows.slice(i - 8, i + 1).every((row) => row.contact === 0 && row.phase === PHASE_RENDERING)) continue;
+    const h1 = b.time_s - a.time_s, h2 = c.time_s - b.time_s;
+    if (!(h1 > 0 && h2 > 0 && h1 + h2 < 8 * GAP_S)) continue;
+    const [p, q, r] = [a, b, c].map((row) => vector(row, 'tool'));
+    const acceleration = p.map((_, k) => (2 * ((r[k] - q[k]) / h2 - (q[k] - p[k]) / h1)) / (h1 + h2));
+    const size = Math.hypot(...acceleration);
+    if (!(size > LEAST_M_PER_S2)) continue;
+    const handle_N = rows[i].handle_kg * size;  // of the hand's force, what the sensor behind the handle doesn't see
+    const force = evenForce(rows.slice(i - 8, i + 1));
+    points.push([size, dot(force, acceleration) / size + handle_N]);
+  }
+  return points;
+}
+
+// Of each row in touch: depth in mm, force in N; and what the last touch took of the hand's energy along that way, in mJ:
+// nothing of a wall or a spring, more than nothing of what damps, less of what swings.
+// `surface_m`: where depth begins, a layer's thickness above what is rigid.
+export function touchPoints(rows, surface_m = 0) {
+  const points = [];
+  let work = NaN, before = null, begun = 0;
+  for (const row of rows) {
+    const touches = row.contact !== 0 && row.phase === PHASE_RENDERING;
+    if (touches && (!before || !following(before, row))) {
+      begun = row.time_s;
+      work = 0;
+    }
+    if (touches && row.time_s - begun > BLOW_S) {
+      const depth = 1e3 * (surface_m - row.tool_clearance_m);
+      if (before?.depth !== undefined) work += 0.5 * (row.contact_N + before.contact_N) * (depth - before.depth);
+      points.push([depth, row.contact_N]);
+      before = { ...row, depth };
+    } else {
+      before = touches ? row : null;
+    }
+  }
+  return { points, work };
+}
+
+class Scatter {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.context = canvas.getContext('2d');
+  }
+
+  // `meant(x)`: the force that is meant, and its ground from `low(x)` to `high(x)`; null: none. `wide`: x at the right.
+  draw(title, unit, points, { wide, most, line, ground, from = 0 }) {
+    const c = this.context, { clientWidth: width, clientHeight: height } = this.canvas;
+    const ratio = Math.min(2, devicePixelRatio || 1);
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round(height * ratio);
+    c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const x = (v) => LEFT + ((v - from) / (wide - from)) * (width - LEFT - RIGHT);
+    const y = (v) => height - BOTTOM - (v / most) * (height - TOP - BOTTOM);
+    c.save();
+    c.beginPath();
+    c.rect(LEFT, TOP, width - LEFT - RIGHT, height - TOP - BOTTOM);
+    c.clip();
+    c.fillStyle = colour('--band');
+    c.beginPath();
+    ground.forEach(([u, v], i) => (i ? c.lineTo(x(u), y(v)) : c.moveTo(x(u), y(v))));
+    c.fill();
+    c.fillStyle = colour('--line-felt');
+    for (const [u, v] of points) c.fillRect(x(u) - 1, y(v) - 1, 2, 2);
+    c.strokeStyle = colour('--line-wanted');
+    c.setLineDash(dash('wanted'));
+    c.lineWidth = 1.6;
+    c.beginPath();
+    line.forEach(([u, v], i) => (i ? c.lineTo(x(u), y(v)) : c.moveTo(x(u), y(v))));
+    c.stroke();
+    c.restore();
+    c.setLineDash([]);
+    c.strokeStyle = colour('--line');
+    c.strokeRect(LEFT, TOP, width - LEFT - RIGHT, height - TOP - BOTTOM);
+    c.font = FONT;
+    c.fillStyle = colour('--soft');
+    c.textBaseline = 'middle';
+    c.textAlign = 'left';
+    c.fillText(title, 2, 8);
+    c.textAlign = 'right';
+    c.fillText(`${Number(most.toPrecision(2))}`, LEFT - 3, TOP + 5);
+    c.fillText(`${Number(wide.toPrecision(2))} ${unit}`, width - RIGHT, height - 7);
+    c.textAlign = 'left';
+    c.fillText(`${Number(from.toPrecision(2))}`.replace('-', '−'), LEFT, height - 7);
+  }
+}
+
+const highest = (points, at, least) => Math.max(least, ...points.map((point) => Math.abs(point[at]))) * 1.1;
+
+export class Felt {
+  constructor(section, stage) {
+    this.section = section;
+    this.objects = stage.scene.objects;
+    section.hidden = stage.mode === 'arm';
+    [this.free, this.touch] = [...section.querySelectorAll('canvas')].map((canvas) => new Scatter(canvas));
+    this.words = section.querySelector('p');
+    this.drawn = 0;
+    onTheme(() => { this.drawn = 0; });
+  }
+
+  draw(now, rows) {
+    if (this.section.hidden || now - this.drawn < BETWEEN_MS || !rows.length) return;
+    this.drawn = now;
+    const last = rows[rows.length - 1];
+    this.points = freePoints(rows);
+    this.drawFree(last.mass_kg);
+    const touched = rows.filter((row) => row.contact !== 0).pop(), layer = this.objects[touched?.object]?.layer;
+    const { points, work } = touchPoints(rows, layer?.thickness);
+    this.touched = points;
+    this.drawTouch(points, layer?.stiffness);
+    this.words.textContent = this.sentence(last.mass_kg, work);
+  }
+
+  // Mass by the least squares of force over acceleration.
+  get felt_kg() {
+    const [fa, aa] = this.points.reduce(([s, t], [a, f]) => [s + f * a, t + a * a], [0, 0]);
+    return this.points.length > 20 ? fa / aa : NaN;
+  }
+
+  sentence(mass_kg, work) {
+    const felt = this.felt_kg, off = felt / mass_kg - 1, parts = [];
+    if (mass_kg > 0 && Number.isFinite(felt)) {
+      parts.push(`feels like ${felt.toFixed(2)} kg, ${Math.abs(off) > NOTICEABLE ? 'which a hand notices' : 'which no hand tells from what is meant'}`);
+    }
+    if (Number.isFinite(work) && Math.abs(work) > 1e-3) {
+      parts.push(`the last touch ${work > 0 ? 'took' : 'gave'} ${Math.abs(work).toPrecision(2)} mJ along its normal`);
+    }
+    return parts.join('; ');
+  }
+
+  drawFree(mass_kg) {
+    const wide = highest(this.points, 0, 0.2), most = Math.max(highest(this.points, 1, 0.2), mass_kg * wide * 1.1);
+    const meant = mass_kg > 0 ? mass_kg * wide : 0;
+    this.free.draw('N, by acceleration', 'm/s²', this.points, {
+      wide, most, line: [[0, 0], [wide, meant]],
+      ground: [[0, 0], [wide, (1 + NOTICEABLE) * meant], [wide, (1 - NOTICEABLE) * meant]] });
+  }
+
+  // A rigid object holds at its surface, and whatever is steep enough feels so; a layer is a spring.
+  drawTouch(points, layer_N_per_m) {
+    const most = highest(points, 1, 1), rigid = !(layer_N_per_m > 0), k = rigid ? RIGID_N_PER_MM : 1e-3 * layer_N_per_m;
+    const wide = Math.max(highest(points, 0, 0.01), (rigid ? 1.2 : 1) * (most / k)), from = -0.15 * wide;
+    this.touch.draw('N, by depth', 'mm', points, rigid
+      ? { wide, most, from, line: [[0, 0], [0, most]], ground: [[from, 0], [from, most], [most / k, most], [0, 0]] }
+      : { wide, most, from, line: [[0, 0], [wide, k * wide]],
+          ground: [[0, 0], [wide, (1 + NOTICEABLE) * k * wide], [wide, (1 - NOTICEABLE) * k * wide]] });
+  }
+}

@@ -1,0 +1,179 @@
+// The touch, enlarged until what is too small for the picture is seen: how far the tool, and in a simulation's record its
+// steel, are from where the proxy presses. A section through the strongest contact, along its normal and along the way on
+// which the tool is aside.
+import { colour, dash, onTheme } from './theme.js';
+import { vector } from './connection.js';
+
+const LEAST_M = 1e-6, MOST_M = 1e-2;  // of the scale bar
+const BAR_PX = 64;                    // at least so long, at most 2.5 times
+const STEPS = [1, 2, 5];
+const FONT = '11px system-ui, "DejaVu Sans", sans-serif';
+const MARGIN = 30;                    // between what is furthest away and the border
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+// 3.2e-5 → "32 µm".
+export function length(m) {
+  const size = Math.abs(m);
+  if (size < 5e-8) return '0';
+  const [factor, unit] = size >= 1e-3 ? [1e3, 'mm'] : [1e6, 'µm'];
+  const number = factor * size;
+  return `${number >= 100 ? number.toFixed(0) : Number(number.toPrecision(2))} ${unit}`;
+}
+
+// Lengths of the bar: 1, 2, 5 µm … 10 mm.
+const BARS = [];
+for (let decade = -6; decade <= -3; ++decade) for (const step of STEPS) BARS.push(step * 10 ** decade);
+BARS.push(MOST_M);
+
+// In the section: aside and up, in metres from the place where the contact is.
+export function sectionOf(touch) {
+  const normal = vector(touch, 'normal');
+  const things = { tool: vector(touch, 'tool'), steel: vector(touch, 'steel') };
+  const asideOf = (v) => v.map((x, i) => x - dot(v, normal) * normal[i]);
+  const aside = asideOf(things.tool), far = Math.hypot(...aside);
+  const along = far > 1e-12 ? aside.map((x) => x / far) : [0, 0, 0];
+  const section = { proxy: [0, Math.max(0, touch.gap_m)], wide: far };
+  for (const [name, v] of Object.entries(things)) {
+    if (v.every(Number.isFinite)) section[name] = [dot(v, along), dot(v, normal)];
+  }
+  return section;
+}
+
+export class Microscope {
+  constructor(box) {
+    this.box = box;
+    this.canvas = box.querySelector('canvas');
+    this.context = this.canvas.getContext('2d');
+    this.wanted = true;
+    this.bar_m = 1e-5;
+    onTheme(() => this.show(this.moment));
+  }
+
+  toggle() {
+    this.wanted = !this.wanted;
+    this.show(this.moment);
+    return this.wanted;
+  }
+
+  // Hidden where nothing is touched.
+  show(moment) {
+    this.moment = moment;
+    const strongest = moment?.contact ? moment.touches.reduce((most, touch) =>
+      (!most || Math.hypot(...vector(touch, 'force')) > Math.hypot(...vector(most, 'force')) ? touch : most), null) : null;
+    this.box.hidden = !this.wanted || !strongest;
+    if (this.box.hidden) return;
+    this.section = sectionOf(strongest);
+    this.draw(strongest.slips);
+  }
+
+  fit() {
+    const { clientWidth: width, clientHeight: height } = this.canvas, ratio = Math.min(2, devicePixelRatio || 1);
+    if (this.canvas.width !== Math.round(width * ratio)) this.canvas.width = Math.round(width * ratio);
+    if (this.canvas.height !== Math.round(height * ratio)) this.canvas.height = Math.round(height * ratio);
+    this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    return [width, height];
+  }
+
+  // The longest bar of the table with which everything is within the picture, kept while it fits well enough.
+  scale(room) {
+    const places = ['proxy', 'tool', 'steel'].filter((name) => this.section[name]).map((name) => this.section[name]);
+    const far = Math.max(LEAST_M / 20, ...places.map(([x, y]) => Math.max(Math.abs(x) / 1.3, Math.abs(y))));
+    const fits = (bar) => (far / bar) * BAR_PX <= room;
+    const keeps = fits(this.bar_m) && (far / this.bar_m) * BAR_PX > 0.12 * room;
+    if (!keeps) this.bar_m = BARS.find(fits) ?? MOST_M;
+    return BAR_PX / this.bar_m;
+  }
+
+  draw(slips) {
+    const c = this.context, [width, height] = this.fit();
+    if (!width) return;
+    c.clearRect(0, 0, width, height);
+    const x0 = width / 2, y0 = height * 0.46, scale = this.scale(height * 0.46 - MARGIN);
+    this.drawSolid(width, height, y0);
+    const at = ([aside, up]) => [x0 + scale * aside, y0 - scale * up];
+    const { proxy, tool, steel } = this.section;
+    this.leash(at(proxy), at(tool));
+    this.ring(at(proxy), 5, colour(slips ? '--slip' : '--stick'), true);
+    if (steel) this.cross(at(steel), colour('--ink'));
+    this.ring(at(tool), 8, colour('--tool'), false);
+    this.texts(width, height, scale);
+  }
+
+  // The solid's side of the surface, hatched.
+  drawSolid(width, height, y0) {
+    const c = this.context;
+    c.fillStyle = colour('--solid');
+    c.globalAlpha = 0.28;
+    c.fillRect(0, y0, width, height - y0);
+    c.globalAlpha = 1;
+    c.strokeStyle = colour('--solid-edge');
+    c.lineWidth = 1.5;
+    c.beginPath();
+    c.moveTo(0, y0);
+    c.lineTo(width, y0);
+    for (let x = 6; x < width; x += 12) {
+      c.moveTo(x, y0);
+      c.lineTo(x - 6, y0 + 6);
+    }
+    c.stroke();
+  }
+
+  leash(from, to) {
+    const c = this.context;
+    c.strokeStyle = colour('--line-tool');
+    c.setLineDash(dash('proxy'));
+    c.lineWidth = 1.2;
+    c.beginPath();
+    c.moveTo(...from);
+    c.lineTo(...to);
+    c.stroke();
+    c.setLineDash([]);
+  }
+
+  ring([x, y], radius, paint, filled) {
+    const c = this.context;
+    c.beginPath();
+    c.arc(x, y, radius, 0, 2 * Math.PI);
+    c.fillStyle = c.strokeStyle = paint;
+    c.lineWidth = 2.6;
+    if (filled) c.fill(); else c.stroke();
+  }
+
+  cross([x, y], paint) {
+    const c = this.context;
+    c.strokeStyle = paint;
+    c.lineWidth = 2.2;
+    c.beginPath();
+    for (const [a, b] of [[-5, -5], [5, -5]]) {
+      c.moveTo(x + a, y + b);
+      c.lineTo(x - a, y - b);
+    }
+    c.stroke();
+  }
+
+  texts(width, height, scale) {
+    const c = this.context, { tool, steel } = this.section;
+    const narrow = width < 200;
+    c.font = narrow ? FONT.replace('11', '10') : FONT;
+    c.fillStyle = colour('--ink');
+    c.textBaseline = 'alphabetic';
+    c.textAlign = 'left';
+    const place = ([aside, up]) => `${length(up)} ${up < 0 ? (narrow ? 'in' : 'inside') : 'away'}, ${length(aside)} aside`;
+    c.fillText(`○ tool ${place(tool)}`, 8, height - (steel ? 22 : 8));
+    if (steel) c.fillText(`× steel ${place(steel)}`, 8, height - 8);
+    const bar = scale * this.bar_m, right = width - 10;
+    c.strokeStyle = colour('--ink');
+    c.lineWidth = 2;
+    c.beginPath();
+    c.moveTo(right - bar, 20);
+    c.lineTo(right, 20);
+    for (const x of [right - bar, right]) {
+      c.moveTo(x, 16);
+      c.lineTo(x, 24);
+    }
+    c.stroke();
+    c.textAlign = 'center';
+    c.fillText(length(this.bar_m), right - bar / 2, 13);
+  }
+}
