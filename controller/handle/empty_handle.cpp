@@ -16,7 +16,7 @@ constexpr double calm_way_m = 0.02, shortest_calm_s = 0.06;
 constexpr double quiet_way_m = 0.04, shortest_quiet_s = 0.5;
 constexpr double longest_s = 1.5;
 // How far what the tare doesn't know of the bias may lead a mass from rest.
-constexpr double unknown_way_m = 1e-3;
+constexpr double unknown_way_m = 1.7e-3;
 constexpr double leaving = 1.5;
 // After an acceleration of the arm the handle may oscillate for two periods of its first mode (15 Hz).
 constexpr double ringing_s = 0.1;

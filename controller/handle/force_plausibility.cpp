@@ -24,11 +24,13 @@ constexpr double ramp_noises = 30.0, constant_noises = 10.0, constant_share = 0.
 
 }  // namespace
 
-// Whether the force is a straight line in the distance, to its share of the variance. With NaN it is none.
-bool ReversedForce::is_line() const noexcept {
+// Whether the force's part along a direction is a straight line in the distance's, to its share of the variance. With
+// NaN it is none.
+bool ReversedForce::is_line(const Vec3& along) const noexcept {
   const State& s = state_;
-  const double xx = s.xx - s.x.squaredNorm() / s.n, hh = s.hh - s.h.squaredNorm() / s.n;
-  const double xh = s.xh - s.x.dot(s.h) / s.n;
+  const double x = along.dot(s.x), h = along.dot(s.h);
+  const double xx = along.dot(s.xx * along) - x * x / s.n, hh = along.dot(s.hh * along) - h * h / s.n;
+  const double xh = along.dot(s.xh * along) - x * h / s.n;
   return xh > 0.0 && xh * xh >= explained * xx * hh;
 }
 
@@ -51,11 +53,13 @@ bool ReversedForce::step(const ForceAndMotion& now) noexcept {
   s.n += 1.0;
   s.x += x;
   s.h += net_W;
-  s.xx += x.squaredNorm();
-  s.hh += net_W.squaredNorm();
-  s.xh += x.dot(net_W);
-  const double least_N = std::max(least_force_N, least_growth * s.first_N);
-  return s.n >= least_samples && net_W.norm() >= least_N && x.norm() >= least_way_m && is_line();
+  s.xx += x * x.transpose();
+  s.hh += net_W * net_W.transpose();
+  s.xh += x * net_W.transpose();
+  const double net_N = net_W.norm(), least_N = std::max(least_force_N, least_growth * s.first_N);
+  if (s.n < least_samples || net_N < least_N) return false;
+  const Vec3 along = net_W / net_N;
+  return x.dot(along) >= least_way_m && is_line(along);
 }
 
 void StraightForce::add(const ForceAndMotion& now) noexcept {

@@ -6,9 +6,10 @@
 // e^λt. x is the distance from where the proxy would be if it had stayed at rest, or had gone on evenly since no force
 // led it. The force is reversed if, in that time,
 //
-//   1. it has grown to 3 N and to twice of what it was at first, x to 6 mm, nothing was touched, and
+//   1. it has grown to 3 N and to twice of what it was at first, x along it to 6 mm, nothing was touched, and
 //      no limit acted;
-//   2. the straight line, by least squares over all samples, explains 97 % of the force's variance, and rises.
+//   2. the straight line of their parts along the force, by least squares over all samples, explains 97 % of the
+//      force's variance, and rises. (A joint that turns the other way turns one direction alone.)
 //
 // A hand whose net force begins as tⁿ makes x ~ t^(n+2), and a line explains 84 % for n = 1, when it begins to
 // accelerate the arm, 92 % for n = 2, and 95 % for n = 3, when it sets out without a jerk. In 185 sessions of shipped
@@ -61,10 +62,11 @@ class ReversedForce {
     double first_N = 0.0;                        // the net force there
     // Sums over the samples since then, of distance x and net force h.
     models::Vec3 x = models::Vec3::Zero(), h = models::Vec3::Zero();
-    double n = 0.0, xx = 0.0, hh = 0.0, xh = 0.0;
+    models::Mat3 xx = models::Mat3::Zero(), hh = models::Mat3::Zero(), xh = models::Mat3::Zero();
+    double n = 0.0;
     bool judged = false;  // the proxy has touched nothing since
   };
-  [[nodiscard]] bool is_line() const noexcept;
+  [[nodiscard]] bool is_line(const models::Vec3& along) const noexcept;
 
   State state_;
 };

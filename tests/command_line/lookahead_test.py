@@ -136,7 +136,7 @@ class Lookahead(ProgramTest):
         self.summary("--lookahead", "4ms", "--mass", 10, "--duration", "0.5s", "--record", "session")
         self.assertIn("lookahead_s: 0.004", (self.folder / "session" / "effective.yaml").read_text())
         self.assertEqual(json.loads((self.folder / "session" / "summary.json").read_text())["lookahead_s"], 0.004)
-        self.assertIn("lookahead", self.call("run", "--lookahead", "4ms", "--mass", 10, "--duration", "0.5s",
+        self.assertIn("lookahead", self.call("run", "--verbose", "--lookahead", "4ms", "--mass", 10, "--duration", "0.5s",
                                              "--no-plot").out)
 
     def test_what_is_refused(self):
