@@ -8,11 +8,15 @@ namespace {
 
 using models::Vec3;
 
-// The proxy rests below this speed; a hand that holds still trembles as fast. No force leads it below this one.
-constexpr double at_rest_m_per_s = 2e-3, no_force_N = 0.5;
-// A hundred times the noise of a usual sensor: smaller forces say little.
-constexpr double least_force_N = 3.0, least_growth = 2.0, least_way_m = 6e-3, least_samples = 20.0;
-constexpr double explained = 0.97;
+// The proxy rests below this speed; a hand that holds still trembles as fast.
+constexpr double at_rest_m_per_s = 2e-3;
+constexpr double first_mark_m = 0.5e-3;
+constexpr std::size_t doublings = 4;
+constexpr double least_growth = 1.45, least_last_growth = 1.6, least_damped_growth = 1.6, most_growth = 2.1;
+constexpr double kept_growth = 0.85;  // of the largest of them, by the last
+constexpr double least_time = 0.78, most_time = 1.05;
+// A hundred times the noise of a usual sensor. Ratios of smaller forces say little.
+constexpr double least_force_N = 2.0;
 
 // For the straight line:
 constexpr double near_m = 1e-3, far_m = 1e-2;
@@ -24,42 +28,43 @@ constexpr double ramp_noises = 30.0, constant_noises = 10.0, constant_share = 0.
 
 }  // namespace
 
-// Whether the force's part along a direction is a straight line in the distance's, to its share of the variance. With
-// NaN it is none.
-bool ReversedForce::is_line(const Vec3& along) const noexcept {
+bool ReversedForce::grows(std::size_t last, const ForceAndMotion& now) const noexcept {
   const State& s = state_;
-  const double x = along.dot(s.x), h = along.dot(s.h);
-  const double xx = along.dot(s.xx * along) - x * x / s.n, hh = along.dot(s.hh * along) - h * h / s.n;
-  const double xh = along.dot(s.xh * along) - x * h / s.n;
-  return xh > 0.0 && xh * xh >= explained * xx * hh;
+  if (last < doublings || s.force_N[last] < least_force_N) return false;
+  double largest = 0.0, growth = 0.0;
+  for (std::size_t i = last + 1 - doublings; i <= last; ++i) {
+    // λ solves M λ² + B λ = F/x.
+    const double M = now.mass_kg, B = now.damping_Ns_per_m;
+    const double stiffness = s.force_N[i] / (first_mark_m * std::exp2(static_cast<double>(i)));
+    const double lambda = (std::sqrt(B * B + 4.0 * M * stiffness) - B) / (2.0 * M);
+    growth = s.force_N[i] / s.force_N[i - 1];
+    largest = std::max(largest, growth);
+    const double least = B > M * lambda ? least_damped_growth : i == last ? least_last_growth : least_growth;
+    if (!(growth >= least && growth <= most_growth)) return false;
+    const double took = (s.time_s[i] - s.time_s[i - 1]) * lambda / std::log(2.0);
+    if (took < least_time || took > most_time) return false;
+  }
+  return growth >= kept_growth * largest;
 }
 
 bool ReversedForce::step(const ForceAndMotion& now) noexcept {
   State& s = state_;
-  const Vec3 net_W = now.mass_kg / now.period_s * (now.v_W - s.v_k1_W);
-  const bool rests = now.v_W.norm() < at_rest_m_per_s;
-  if (rests || net_W.norm() < no_force_N || net_W.dot(now.v_W) <= 0.0) {
-    s = {};
-    s.rest_W = now.q_W;
-    if (!rests) s.v_rest_W = now.v_W;
-    s.first_N = net_W.norm();
-    s.judged = true;
+  if (now.v_W.norm() < at_rest_m_per_s) {
+    s = {.rest_W = now.q_W, .force_N = {}, .time_s = {}, .passed = 0.0, .since_s = 0.0, .judged = now.free};
+    return false;
   }
-  s.v_k1_W = now.v_W;
-  s.judged = s.judged && now.free && !now.limited;
+  s.judged = s.judged && now.free && now.mass_kg > 0.0;
+  s.since_s += now.period_s;
   if (!s.judged) return false;
-  s.rest_W += now.period_s * s.v_rest_W;
-  const Vec3 x = now.q_W - s.rest_W;
-  s.n += 1.0;
-  s.x += x;
-  s.h += net_W;
-  s.xx += x * x.transpose();
-  s.hh += net_W * net_W.transpose();
-  s.xh += x * net_W.transpose();
-  const double net_N = net_W.norm(), least_N = std::max(least_force_N, least_growth * s.first_N);
-  if (s.n < least_samples || net_N < least_N) return false;
-  const Vec3 along = net_W / net_N;
-  return x.dot(along) >= least_way_m && is_line(along);
+  const double way_m = (now.q_W - s.rest_W).norm();
+  bool found = false;
+  for (auto i = static_cast<std::size_t>(s.passed); i < marks && way_m >= first_mark_m * std::exp2(s.passed); ++i) {
+    s.force_N[i] = now.force_W.norm();
+    s.time_s[i] = s.since_s;
+    s.passed += 1.0;
+    found = found || grows(i, now);
+  }
+  return found;
 }
 
 void StraightForce::add(const ForceAndMotion& now) noexcept {

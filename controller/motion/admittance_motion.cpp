@@ -206,6 +206,7 @@ ProxyMotion AdmittanceMotion::proxy_motion() const noexcept {
   return {.q_W = state_.q_k1_W,
           .v_W = (state_.q_k1_W - state_.q_k2_W) / period_s_,
           .mass_kg = state_.mass_kg,
+          .damping_Ns_per_m = state_.damping_Ns_per_m,
           .touches = state_.touches,
           .limited = state_.limited,
           .braking_torque_W = parts_.tool->braking_torque_W()};
@@ -222,6 +223,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   const WorldStep step = parts_.tool->step(h_W.force, step_limits_);
   if (!take(step, cycle)) return false;
   state_.mass_kg = step.mass_kg;
+  state_.damping_Ns_per_m = step.damping_Ns_per_m;
   state_.touches = step.contacts > 0;
   state_.limited = step.limits.kinds != 0 && !state_.freeing;  // freed, the tool is slow by intent
   if (step.settled) state_.q_k2_W = state_.q_k1_W;

@@ -76,7 +76,7 @@ class AdmittanceMotion final : public Motion {
     models::Vec3 q_k2_W = models::Vec3::Zero();         // and of the one before
     double speed_limit_m_per_s = 0.0;                   // the tool's present speed limit
     models::Vec3 last_normal_W = models::Vec3::Zero();  // the normal of the last contact; zero: there was none
-    double mass_kg = 0.0;                               // that of the proxy's last step
+    double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // those of the proxy's last step
     bool touches = false;                               // the proxy's last step ended in contact
     bool limited = false;                               // a limit acted in it
     bool freeing = false;                               // the tool is being freed: it moves without the scene

@@ -83,9 +83,9 @@ void HandJudge::judge(const MotionCycle& cycle, const ProxyMotion& proxy, bool e
                            .q_W = proxy.q_W,
                            .v_W = proxy.v_W,
                            .mass_kg = proxy.mass_kg + hand_.tool_mass_kg(),
+                           .damping_Ns_per_m = proxy.damping_Ns_per_m,
                            .period_s = period_s_,
                            .free = !proxy.touches,
-                           .limited = proxy.limited,
                            .at_handle = hand_.at_handle() || always_held_};
   const double force_N = now.force_W.norm();
   if (reversed_.step(now)) cycle.alarm.raise(Fault::force_reversed, -1, force_N, 0.0);

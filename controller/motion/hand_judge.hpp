@@ -22,7 +22,7 @@ namespace proxarm::controller {
 // The proxy's last step, as the judge of the hand sees it.
 struct ProxyMotion {
   models::Vec3 q_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();
-  double mass_kg = 0.0;
+  double mass_kg = 0.0, damping_Ns_per_m = 0.0;
   bool touches = false, limited = false;
   models::Vec3 braking_torque_W = models::Vec3::Zero();  // that would bring its turning to rest
 };

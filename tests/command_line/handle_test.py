@@ -254,16 +254,6 @@ class Handle(harness.ProgramTest):
                 self.assertLess(after_s, 0.2)
                 self.assertLess(off_m, 0.05)
 
-    def test_a_sensor_that_is_turned_under_a_hand_that_leads_is_told_by_the_motion(self):
-        """The story: half a turn of some newtons, which leaves the weight as it is, led by 0.4 m until 200 N."""
-        touch = (harness.SOURCE / "sim/hands/touch.yaml").read_text()
-        for name, hand, at_s in (("leads", LEADS, 2.0), ("touch", touch, 1.5), ("touch", touch, 2.5), ("touch", touch, 4.0)):
-            with self.subTest(f"{name} at {at_s} s"):
-                faults, after_s, off_m = self.jumped(hand, "turned", at_s=at_s)
-                self.assertIn(faults, (["force_jumped"], ["force_reversed"]))
-                self.assertLess(after_s, 0.5)
-                self.assertLess(off_m, 0.05)
-
     def test_an_offset_is_told_under_a_hand_that_goes_to_and_fro(self):
         """The story: at 0.3 to 0.4 m/s the force changes by 0.5 N from sample to sample, which hid one of 3 N: 1.2 m."""
         for speed in (0.3, 0.4):

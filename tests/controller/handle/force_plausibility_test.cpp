@@ -20,11 +20,12 @@ struct Moved {
   [[nodiscard]] ForceAndMotion under(const Vec3& hand_N) {
     force = hand_N;
     for (int i = 0; i < 3; ++i) force[i] += noise(generator);
-    v = (mass_kg * v + T * (force - spring_N_per_m * q)) / (mass_kg + T * damping_Ns_per_m);
+    v = (mass_kg * v + T * force) / (mass_kg + T * damping_Ns_per_m);
     q += T * v;
-    return {.force_W = force, .q_W = q, .v_W = v, .mass_kg = mass_kg, .period_s = T};
+    return {
+        .force_W = force, .q_W = q, .v_W = v, .mass_kg = mass_kg, .damping_Ns_per_m = damping_Ns_per_m, .period_s = T};
   }
-  double mass_kg, damping_Ns_per_m = 0.0, spring_N_per_m = 0.0;
+  double mass_kg, damping_Ns_per_m = 0.0;
   Vec3 q = Vec3::Zero(), v = Vec3::Zero(), force = Vec3::Zero();
   std::mt19937 generator{3};
   std::normal_distribution<double> noise{0.0, noise_N};
@@ -50,53 +51,6 @@ TEST(ReversedForce, IsFoundWithinAFewCentimetresWhateverTheGripAndTheMass) {
       EXPECT_TRUE(found) << mass_kg << " kg, " << stiffness << " N/m";
       EXPECT_LT(arm.q.norm(), 0.066) << mass_kg << " kg, " << stiffness << " N/m";
     }
-  }
-}
-
-// The story: shipped hands lead before the sensor's sign goes wrong, and the arm went 0.4 m until 200 N were reached.
-TEST(ReversedForce, IsFoundUnderAHandThatLeadsEvenly) {
-  for (const double speed : {0.03, 0.1, 0.2}) {
-    for (const double damping : {0.0, 20.0}) {
-      Moved arm(4.0);
-      arm.damping_Ns_per_m = damping;
-      ReversedForce reversed;
-      int found_at = 0;
-      double farthest_m = 0.0;
-      for (int k = 0; k < 4'000 && found_at == 0; ++k) {
-        const Vec3 wanted_W(0.0, speed * std::max(0.0, k * T - 0.2), 0.0);
-        const Vec3 hand = 500.0 * (wanted_W - arm.q) - 20.0 * (arm.v - Vec3(0.0, speed, 0.0));
-        if (reversed.step(arm.under(k < 2'000 ? hand : Vec3(-hand)))) found_at = k;
-        if (k >= 2'000) farthest_m = std::max(farthest_m, (arm.q - wanted_W).norm());
-      }
-      EXPECT_GT(found_at, 2'000) << speed << " m/s, " << damping << " Ns/m";
-      EXPECT_LT(farthest_m, 0.05) << speed << " m/s, " << damping << " Ns/m";
-    }
-  }
-}
-
-// The story: against a spring of the scene or the session the hand's force is a straight line in the way, too.
-TEST(ReversedForce, IsNoneAgainstASpring) {
-  for (const double spring : {50.0, 500.0}) {
-    Moved arm(4.0);
-    arm.damping_Ns_per_m = 20.0;
-    arm.spring_N_per_m = spring;
-    ReversedForce reversed;
-    for (int k = 0; k < 4'000; ++k) {
-      const Vec3 hand = 800.0 * (Vec3(0.0, wanted(k * T, 0.2, 3.0), 0.0) - arm.q) - 20.0 * arm.v;
-      ASSERT_FALSE(reversed.step(arm.under(hand))) << spring << ", " << k;
-    }
-  }
-}
-
-// At its speed limit the force of a hand that is faster grows with the way, too.
-TEST(ReversedForce, IsNoneWhereALimitHoldsTheArmBack) {
-  Moved arm(4.0);
-  ReversedForce reversed;
-  for (int k = 0; k < 1'000; ++k) {
-    ForceAndMotion now = arm.under(500.0 * (Vec3(0.0, 1.2 * k * T, 0.0) - arm.q));
-    now.limited = arm.v.norm() >= 0.45;
-    if (now.limited) arm.v *= 0.45 / arm.v.norm();
-    ASSERT_FALSE(reversed.step(now)) << k;
   }
 }
 
