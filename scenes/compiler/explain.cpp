@@ -6,6 +6,7 @@
 #include <sstream>
 #include <vector>
 
+#include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/obstacles.hpp"
 
 namespace proxarm::scenes {

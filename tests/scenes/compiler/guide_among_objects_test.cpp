@@ -255,6 +255,7 @@ TEST(GuideAmongObjects, KeepsAssumption1WhilePushed) {
         Vec3 q = Vec3(0.3, 0, 0);
         std::size_t contacts = 0, pressed = 0;
         double worst = 0.0, least = 1.0;
+        const scenes::Clearances clearances(scene);
         const std::uint64_t before = allocation_count();
         const int steps = static_cast<int>(scaled(4000, 500));
         for (int k = 1; k <= steps; ++k) {
@@ -282,7 +283,7 @@ TEST(GuideAmongObjects, KeepsAssumption1WhilePushed) {
           }
           // The same force: another point of a polyline may be a solution, too, near its corner.
           if (guide == around && (r - Vec3(1, 0, 0)).norm() < 0.05) worst = std::min(worst, 1.0);
-          least = std::min(least, scenes::Clearances(scene).of_point(r, 1e-3 * k));
+          least = std::min(least, clearances.of_point(r, 1e-3 * k));
           // 0.12 · 2π · 1.5 m/s and 0.4 rad/s at up to 2 m.
           ASSERT_LE((step(K, q, q) - q).norm(), 10.0 * 2e-3);
           q = r;
@@ -324,6 +325,7 @@ TEST(GuideAmongObjects, NeverEntersAnything) {
       const auto world = compile(scene);
       auto& g = world.algorithm<3>();
       Vec3 q = Vec3::Zero();
+      const scenes::Clearances clearances(scene);
       const std::uint64_t before = allocation_count();
       std::size_t stopped = 0;
       double least = 1.0, off = 0.0;
@@ -332,7 +334,7 @@ TEST(GuideAmongObjects, NeverEntersAnything) {
       for (std::int64_t i = 0; i < steps; ++i) {
         q = g(1e6, q + random.log_uniform(1e-9, 1.0) * random.direction<3>() + Vec3(1e-5, 0, 0), q);
         off = std::max(off, std::abs(q.z()));
-        if (i % 4 == 0) least = std::min(least, scenes::Clearances(scene).of_point(q));
+        if (i % 4 == 0) least = std::min(least, clearances.of_point(q));
         stopped += g.contacts().size() > 1 ? 1 : 0;
         if (q.norm() > 2.0) q = Vec3::Zero();
       }
