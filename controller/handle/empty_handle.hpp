@@ -52,7 +52,7 @@ struct HandSigns {
   bool left_by_tare = false;     // it is what a hand left in the tare
   bool as_offset = false;        // it acts at the sensor's origin
   double unknown_N = 0.0;        // of it, what may be a weight that isn't the tool's in the cell
-  bool limited = false;          // a limit held the proxy back in its last step
+  bool limited = false;          // the tool's speed limit held the proxy back in its last step
 };
 
 class EmptyHandle {

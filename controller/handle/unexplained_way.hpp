@@ -39,7 +39,7 @@ struct LedHandle {
   double period_s = 0.0;
   bool left_by_tare = false;
   bool as_offset = false;  // it acts at the sensor's origin (hand_force.hpp)
-  bool limited = false;    // a limit held the proxy back in its last step
+  bool limited = false;    // the tool's speed limit held the proxy back in its last step
 };
 
 class UnexplainedWay {

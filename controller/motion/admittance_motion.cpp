@@ -225,7 +225,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   state_.mass_kg = step.mass_kg;
   state_.damping_Ns_per_m = step.damping_Ns_per_m;
   state_.touches = step.contacts > 0;
-  state_.limited = step.limits.kinds != 0 && !state_.freeing;  // freed, the tool is slow by intent
+  state_.limited = step.limits.has(Limit::speed) && !state_.freeing;  // freed, the tool is slow by intent
   if (step.settled) state_.q_k2_W = state_.q_k1_W;
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.touches[0].normal_W;

@@ -23,7 +23,8 @@ namespace proxarm::controller {
 struct ProxyMotion {
   models::Vec3 q_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();
   double mass_kg = 0.0, damping_Ns_per_m = 0.0;
-  bool touches = false, limited = false;
+  bool touches = false;
+  bool limited = false;                                  // by the tool's speed
   models::Vec3 braking_torque_W = models::Vec3::Zero();  // that would bring its turning to rest
 };
 

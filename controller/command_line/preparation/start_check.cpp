@@ -110,12 +110,13 @@ void require_turning(const PreparedSession& session, const models::Arm& arm) {
 const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
   const scenes::Object* found = nullptr;
   double least_m = std::numeric_limits<double>::infinity();
-  const scenes::Clearances clearances(scene);
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    const double clearance_m = clearances.of_object(i, point_W, 0.0).value_or(least_m);
+  for (const scenes::Object& object : scene.objects) {
+    scenes::Scene alone;
+    alone.objects.push_back(object);
+    const double clearance_m = scenes::Clearances(alone).of_point(point_W);
     if (clearance_m >= least_m) continue;
     least_m = clearance_m;
-    found = &scene.objects[i];
+    found = &object;
   }
   return found;
 }
