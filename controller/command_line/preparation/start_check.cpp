@@ -122,7 +122,7 @@ const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
 }
 
 void require_outside(const PreparedSession& session, const Vec3& start_W) {
-  const double clearance_m = scenes::Clearances(session.scene).of_point(start_W);
+  const double clearance_m = session.clearances->of_point(start_W);
   if (clearance_m >= -start_tolerance_m) return;
   const scenes::Object* object = deepest(session.scene, start_W);
   char depth[32];
