@@ -1,6 +1,7 @@
 // The touch, enlarged until what is too small for the picture is seen: how far the tool, and in a simulation's record its
 // steel, are from where the proxy presses. A section through the strongest contact, along its normal and along the way on
-// which the tool is aside.
+// which the tool is aside. Where the tool could go no further than a millimetre along the normal, as in a hole,
+// that side is there as well; before anything is touched the section is that through what is nearest.
 import { colour, dash, onTheme } from './theme.js';
 import { vector } from './connection.js';
 
@@ -8,6 +9,7 @@ const LEAST_M = 1e-6, MOST_M = 1e-2;  // of the scale bar
 const BAR_PX = 64;                    // at least so long, at most 2.5 times
 const STEPS = [1, 2, 5];
 const FONT = '11px system-ui, "DejaVu Sans", sans-serif';
+const MOST_TIMES = 20;                // the other side, of what else is in the picture
 const MARGIN = 30;                    // between what is furthest away and the border
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -40,6 +42,22 @@ export function sectionOf(touch) {
   return section;
 }
 
+// While nothing presses: the whole tool beside the proxy, which is `room_below_m` from what is nearest.
+export function nearestTouch(moment) {
+  if (!Number.isFinite(moment.room_below_m)) return null;
+  const proxy = vector(moment, 'proxy'), steel = vector(moment, 'steel'), known = steel.some((x) => x !== 0);
+  const touch = { slips: false, gap_m: moment.room_below_m };
+  ['x', 'y', 'z'].forEach((axis, i) => {
+    touch[`normal_${axis}`] = moment[`room_${axis}`];
+    touch[`tool_${axis}`] = moment[`tool_${axis}`] - proxy[i];
+    touch[`steel_${axis}`] = known ? steel[i] - proxy[i] : NaN;
+  });
+  return touch;
+}
+
+// The other side above the surface that is touched, in metres; infinite where there is none.
+export const otherSide = (moment) => (Number.isFinite(moment.room_above_m) ? moment.room_above_m + Math.max(0, moment.room_below_m) : Infinity);
+
 export class Microscope {
   constructor(box) {
     this.box = box;
@@ -56,15 +74,17 @@ export class Microscope {
     return this.wanted;
   }
 
-  // Hidden where nothing is touched.
+  // Hidden where nothing is touched, nor within a millimetre.
   show(moment) {
     this.moment = moment;
     const strongest = moment?.contact ? moment.touches.reduce((most, touch) =>
       (!most || Math.hypot(...vector(touch, 'force')) > Math.hypot(...vector(most, 'force')) ? touch : most), null) : null;
-    this.box.hidden = !this.wanted || !strongest;
+    const touch = strongest ?? (moment ? nearestTouch(moment) : null);
+    this.box.hidden = !this.wanted || !touch;
     if (this.box.hidden) return;
-    this.section = sectionOf(strongest);
-    this.draw(strongest.slips);
+    this.section = { ...sectionOf(touch), other: otherSide(moment) };
+    this.touched = Boolean(strongest);
+    this.draw(touch.slips);
   }
 
   fit() {
@@ -78,7 +98,9 @@ export class Microscope {
   // The longest bar of the table with which everything is within the picture, kept while it fits well enough.
   scale(room) {
     const places = ['proxy', 'tool', 'steel'].filter((name) => this.section[name]).map((name) => this.section[name]);
-    const far = Math.max(LEAST_M / 20, ...places.map(([x, y]) => Math.max(Math.abs(x) / 1.3, Math.abs(y))));
+    let far = Math.max(LEAST_M / 20, ...places.map(([x, y]) => Math.max(Math.abs(x) / 1.3, Math.abs(y))));
+    // The other side is seen unless all else would become too small for that; its number stands there anyway.
+    if (this.section.other < MOST_TIMES * far || this.section.other < MOST_TIMES * LEAST_M) far = Math.max(far, this.section.other);
     const fits = (bar) => (far / bar) * BAR_PX <= room;
     const keeps = fits(this.bar_m) && (far / this.bar_m) * BAR_PX > 0.12 * room;
     if (!keeps) this.bar_m = BARS.find(fits) ?? MOST_M;
@@ -90,7 +112,9 @@ export class Microscope {
     if (!width) return;
     c.clearRect(0, 0, width, height);
     const x0 = width / 2, y0 = height * 0.46, scale = this.scale(height * 0.46 - MARGIN);
-    this.drawSolid(width, height, y0);
+    this.drawSolid(width, y0, height, 1);
+    const above = y0 - scale * this.section.other;
+    if (above > 0) this.drawSolid(width, above, 0, -1);
     const at = ([aside, up]) => [x0 + scale * aside, y0 - scale * up];
     const { proxy, tool, steel } = this.section;
     this.leash(at(proxy), at(tool));
@@ -100,12 +124,12 @@ export class Microscope {
     this.texts(width, height, scale);
   }
 
-  // The solid's side of the surface, hatched.
-  drawSolid(width, height, y0) {
+  // The solid's side of a surface at `y0`, hatched, as far as `end`; `side`: 1 below, −1 above.
+  drawSolid(width, y0, end, side) {
     const c = this.context;
     c.fillStyle = colour('--solid');
     c.globalAlpha = 0.28;
-    c.fillRect(0, y0, width, height - y0);
+    c.fillRect(0, Math.min(y0, end), width, Math.abs(end - y0));
     c.globalAlpha = 1;
     c.strokeStyle = colour('--solid-edge');
     c.lineWidth = 1.5;
@@ -114,7 +138,7 @@ export class Microscope {
     c.lineTo(width, y0);
     for (let x = 6; x < width; x += 12) {
       c.moveTo(x, y0);
-      c.lineTo(x - 6, y0 + 6);
+      c.lineTo(x - 6, y0 + 6 * side);
     }
     c.stroke();
   }
@@ -153,15 +177,17 @@ export class Microscope {
   }
 
   texts(width, height, scale) {
-    const c = this.context, { tool, steel } = this.section;
+    const c = this.context, { tool, steel, other } = this.section;
     const narrow = width < 200;
     c.font = narrow ? FONT.replace('11', '10') : FONT;
     c.fillStyle = colour('--ink');
     c.textBaseline = 'alphabetic';
     c.textAlign = 'left';
     const place = ([aside, up]) => `${length(up)} ${up < 0 ? (narrow ? 'in' : 'inside') : 'away'}, ${length(aside)} aside`;
-    c.fillText(`○ tool ${place(tool)}`, 8, height - (steel ? 22 : 8));
-    if (steel) c.fillText(`× steel ${place(steel)}`, 8, height - 8);
+    const lines = [`○ tool ${place(tool)}`];
+    if (steel) lines.push(`× steel ${place(steel)}`);
+    if (Number.isFinite(other)) lines.unshift(narrow ? `fit ${length(other)}` : `fit: ${length(other)} to the other side`);
+    lines.forEach((line, i) => c.fillText(line, 8, height - 8 - 14 * (lines.length - 1 - i)));
     const bar = scale * this.bar_m, right = width - 10;
     c.strokeStyle = colour('--ink');
     c.lineWidth = 2;
