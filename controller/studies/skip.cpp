@@ -279,7 +279,7 @@ std::string skip_answer(const Table& table) {
     contact_ns = std::max(contact_ns, table.number(row, table.column("contact_ns")));
   }
   char title[160];
-  std::snprintf(title, sizeof title, "A step among up to %.0f objects or %.0f triangles: at most %.0f ns, in contact %.0f ns",
+  std::snprintf(title, sizeof title, "A step far from up to %.0f objects or %.0f triangles takes at most %.0f ns, in contact %.0f ns",
                 objects, triangles, far_ns, contact_ns);
   return title;
 }

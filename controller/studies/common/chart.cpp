@@ -119,7 +119,7 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
   gp << "set grid lc rgb '#c0c0c0' lw 0.6\nset tics scale 0.7\nset multiplot\n"
      << "set label 1000 " << plain(chart.title) << " at screen 0.5, screen " << 1.0 - 26.0 / height
      << " center font 'sans,22'\n";
-  if (rows > 1) gp << "set lmargin 9\n";  // panels that stand below each other begin at the same place
+  if (rows > 1) gp << "set lmargin 10\n";  // panels that stand below each other begin at the same place
   std::size_t block = 0;
   for (std::size_t i = 0; i < chart.panels.size(); ++i) {
     const Panel& panel = chart.panels[i];

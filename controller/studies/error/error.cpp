@@ -185,7 +185,7 @@ std::string glance_answer(const RunsByCase& all) {
   };
   char title[160];
   std::snprintf(title, sizeof title,
-                "At 1 ms order 2 is within %.2g µm in every motion, the best penalty method within %.2g µm",
+                "At 1 ms order 2 is within %.3g µm in every motion, the best penalty method within %.3g µm",
                 worst_um(order_2), std::min({worst_um(penalty_euler), worst_um(penalty_rk4), worst_um(penalty_implicit)}));
   return title;
 }

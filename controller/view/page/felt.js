@@ -143,9 +143,11 @@ class Scatter {
     c.fillText(title, 2, 8);
     c.textAlign = 'right';
     c.fillText(`${Number(most.toPrecision(2))}`, LEFT - 3, TOP + 5);
-    c.fillText(`${Number(wide.toPrecision(2))} ${unit}`, width - RIGHT, height - 7);
+    const widest = `${Number(wide.toPrecision(2))} ${unit}`, least = `${Number(from.toPrecision(2))}`.replace('-', '−');
+    c.fillText(widest, width - RIGHT, height - 7);
     c.textAlign = 'left';
-    c.fillText(`${Number(from.toPrecision(2))}`.replace('-', '−'), LEFT, height - 7);
+    // Where there isn't room for both, the unit goes first.
+    if (c.measureText(widest).width + c.measureText(least).width + 4 < width - RIGHT - LEFT) c.fillText(least, LEFT, height - 7);
   }
 }
 

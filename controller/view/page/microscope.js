@@ -1,7 +1,7 @@
-// The touch, enlarged until what is too small for the picture is seen: how far the tool, and in a simulation's record its
+// The touch, enlarged until what is too small for the picture is seen: how far the tool, and of a simulation its
 // steel, are from where the proxy presses. A section through the strongest contact, along its normal and along the way on
-// which the tool is aside. Where the tool could go no further than a millimetre along the normal, as in a hole,
-// that side is there as well; before anything is touched the section is that through what is nearest.
+// which the tool is aside. Where the tool can go less than a millimetre along the normal, as in a hole, the other side is
+// drawn as well; before anything is touched the section is the one through what is nearest.
 import { colour, dash, onTheme } from './theme.js';
 import { vector } from './connection.js';
 
@@ -186,7 +186,8 @@ export class Microscope {
     const place = ([aside, up]) => `${length(up)} ${up < 0 ? (narrow ? 'in' : 'inside') : 'away'}, ${length(aside)} aside`;
     const lines = [`○ tool ${place(tool)}`];
     if (steel) lines.push(`× steel ${place(steel)}`);
-    if (Number.isFinite(other)) lines.unshift(narrow ? `fit ${length(other)}` : `fit: ${length(other)} to the other side`);
+    const fit = other < LEAST_M / 20 ? 'none' : length(other);
+    if (Number.isFinite(other)) lines.unshift(narrow ? `room ${fit}` : `room to the other side: ${fit}`);
     lines.forEach((line, i) => c.fillText(line, 8, height - 8 - 14 * (lines.length - 1 - i)));
     const bar = scale * this.bar_m, right = width - 10;
     c.strokeStyle = colour('--ink');
