@@ -33,8 +33,8 @@ VibrationThreshold read_vibration(const description::YamlNode& node) {
   VibrationThreshold read;
   read.source = node.string("source");
   for (const description::YamlNode& point : node.list("points", 2, 100)) {
-    read.points.push_back({point.number("frequency_Hz", frequency_range),
-                           per_um * point.number("amplitude_um", amplitude_range)});
+    read.points.push_back(
+        {point.number("frequency_Hz", frequency_range), per_um * point.number("amplitude_um", amplitude_range)});
     const std::size_t count = read.points.size();
     if (count > 1 && !(read.points[count - 1].frequency_Hz > read.points[count - 2].frequency_Hz)) {
       throw point.error_at("frequency_Hz", "more than that of the point before: points are sorted by frequency");

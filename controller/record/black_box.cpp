@@ -21,8 +21,8 @@ constexpr double shortest_period_s = 250e-6;
 }  // namespace
 
 void BoxReader::lay_out(Head* head) noexcept {
-  static_assert(alignof(BoxCycle) <= 8 && alignof(BoxFrame) <= 8 && alignof(BoxTruth) <= 8 &&
-                alignof(State) <= 8 && sizeof(Head) % 8 == 0);
+  static_assert(alignof(BoxCycle) <= 8 && alignof(BoxFrame) <= 8 && alignof(BoxTruth) <= 8 && alignof(State) <= 8 &&
+                sizeof(Head) % 8 == 0);
   head_ = head;
   cycles_ = reinterpret_cast<BoxCycle*>(reinterpret_cast<std::byte*>(head) + sizeof(Head));
   truths_ = reinterpret_cast<BoxTruth*>(cycles_ + head->cycle_capacity);

@@ -129,7 +129,8 @@ class BoxReader {
   BoxReader() = default;
   ~BoxReader() = default;
   [[nodiscard]] static std::size_t bytes_for(std::size_t cycles, std::size_t frames) noexcept {
-    return sizeof(Head) + cycles * (sizeof(BoxCycle) + sizeof(BoxTruth)) + frames * sizeof(BoxFrame) + state_count * sizeof(State);
+    return sizeof(Head) + cycles * (sizeof(BoxCycle) + sizeof(BoxTruth)) + frames * sizeof(BoxFrame) +
+           state_count * sizeof(State);
   }
   // The rings within the memory that begins with `head`, which has the capacities.
   void lay_out(Head* head) noexcept;

@@ -74,8 +74,8 @@ std::vector<HandleSpectrum::Band> HandleSpectrum::bands() const {
     const double low_Hz = std::pow(10.0, (band - 0.5) / 10.0), high_Hz = std::pow(10.0, (band + 0.5) / 10.0);
     if (high_Hz > highest_Hz) break;
     double sum = 0.0, differences_sum = 0.0, weighted = 0.0;
-    for (auto line = static_cast<std::size_t>(std::ceil(low_Hz / line_Hz)); static_cast<double>(line) * line_Hz < high_Hz;
-         ++line) {
+    for (auto line = static_cast<std::size_t>(std::ceil(low_Hz / line_Hz));
+         static_cast<double>(line) * line_Hz < high_Hz; ++line) {
       const double f_Hz = static_cast<double>(line) * line_Hz;
       const double radians = 2.0 * std::numbers::pi * f_Hz * period_s_;
       // 2 |X|/Σw, Hann's Σw being n/2, of the place that has these second differences.

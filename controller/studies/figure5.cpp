@@ -142,11 +142,7 @@ std::vector<std::string> Figure5::plot(const Table& table, const Options& option
   char title[160];
   std::snprintf(title, sizeof title, "At rest (1) swings by %.3g N, on leaving (5) pulls with %.3g N; (23) does %s",
                 newtons("oscillation_N", "1"), newtons("pull_force_N", "5"), neither ? "neither" : "one of these, too");
-  Chart chart{.title = title,
-              .columns = 3,
-              .panel_width = 560,
-              .panel_height = 250,
-              .panels = {}};
+  Chart chart{.title = title, .columns = 3, .panel_width = 560, .panel_height = 250, .panels = {}};
   struct Quantity {
     const char *column, *label;
     double factor, low, high;

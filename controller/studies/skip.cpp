@@ -279,7 +279,8 @@ std::string skip_answer(const Table& table) {
     contact_ns = std::max(contact_ns, table.number(row, table.column("contact_ns")));
   }
   char title[160];
-  std::snprintf(title, sizeof title, "A step far from up to %.0f objects or %.0f triangles takes at most %.0f ns, in contact %.0f ns",
+  std::snprintf(title, sizeof title,
+                "A step far from up to %.0f objects or %.0f triangles takes at most %.0f ns, in contact %.0f ns",
                 objects, triangles, far_ns, contact_ns);
   return title;
 }
@@ -288,11 +289,7 @@ std::string skip_answer(const Table& table) {
 
 std::vector<std::string> Skip::plot(const Table& table, const Options& /*options*/,
                                     const std::filesystem::path& out) const {
-  Chart chart{.title = skip_answer(table),
-              .columns = 2,
-              .panel_width = 700,
-              .panel_height = 430,
-              .common_key = true};
+  Chart chart{.title = skip_answer(table), .columns = 2, .panel_width = 700, .panel_height = 430, .common_key = true};
   for (const char* kind : {"objects", "triangles"}) {
     Panel panel{.title = std::string(kind) == "objects" ? "spheres" : "a mesh",
                 .x_label = std::string("number of ") + kind,

@@ -500,6 +500,32 @@ class Page(ProgramTest):
             browser.until("document.getElementById('microscope').hidden", "without it")
             self.assertEqual(browser.complaints(), [])
 
+    def test_the_steel_is_shown_while_a_simulation_runs(self):
+        """It was seen in records alone."""
+        told = """const { section, box, touched, moment } = proxarm.microscope;
+                  return !box.hidden && touched && section.steel ? [moment.cycle, section.steel[1], moment.tool_clearance_m] : null"""
+        with view_browser.Browser() as browser:
+            with Session(self.folder, "run", "--no-plot", "--record", "session", "--duration", "5s", "--view",
+                         "--pace", "realtime") as session:
+                self.opened(browser, session)
+                browser.until(f"(() => {{ {told} }})()", "the touch")
+                live = []
+                for _ in range(15):
+                    live.append(browser.run(told))
+                    time.sleep(0.05)
+                session.until_said("until Ctrl-C")
+            self.assertEqual(browser.complaints(), [])
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            rows = {int(row["cycle"]): row for row in csv.DictReader(file)}
+        live = [one for one in live if one]
+        self.assertGreater(len(live), 5)
+        for cycle, up, clearance in live:
+            row = rows[cycle]
+            self.assertAlmostEqual(up, sum((float(row[f"true_tool_W_{axis}_m"]) - float(row[f"proxy_W_{axis}_m"])) *
+                                           float(row[f"normal_W_{axis}_1"]) for axis in "xyz"), delta=1e-8)
+            self.assertAlmostEqual(clearance, float(row["tool_clearance_m"]), delta=1e-6)
+        self.assertLess(min(up for _, up, _ in live), -1e-6)
+
     def test_what_is_felt_stands_beside_what_is_meant(self):
         """A mass by force over acceleration, and a layer's spring by force over depth, both as the scene has them."""
         self.call("run", "--no-plot", "--record", "shaken", "--duration", "8s", "--scene", SOURCE / "scenes/free.yaml",
@@ -669,9 +695,9 @@ class Page(ProgramTest):
                 if touched:
                     continue
                 part = lambda name: [float(rows[cycle][f"{name}_W_{axis}_m"]) for axis in "xyz"]
-                for place, name in ((tool, "tool"), (steel, "true_tool")):
-                    away = math.dist(part(name), part("proxy"))
-                    self.assertLess(math.hypot(place[1]), away + 1e-9)
+                self.assertAlmostEqual(math.hypot(*tool), math.dist(part("tool"), part("proxy")), delta=1e-9)
+                self.assertLess(math.hypot(*steel), math.dist(part("true_tool"), part("proxy")) + 1e-9)
+                self.assertGreaterEqual(proxy, 0)
             for size, dark in (((1280, 720), False), ((390, 844), True)):
                 with self.subTest(size), Session(self.folder, "view", "peg") as session, \
                         view_browser.Browser(*size, dark=dark) as other:
@@ -687,6 +713,8 @@ class Page(ProgramTest):
                     other.run(f"proxarm.player.goTo({straight})")
                     other.until(f"proxarm.player.isShown({straight})", "that cycle")
                     self.assertAlmostEqual(other.run("return proxarm.microscope.section.other"), 24e-6, delta=1e-6)
+                    # It is wide enough to be seen.
+                    self.assertTrue(10e-6 <= other.run("return proxarm.microscope.bar_m") <= 100e-6)
                     other.picture(f"fit-{size[0]}")
                     self.assertEqual(other.complaints(), [])
             self.assertEqual(browser.complaints(), [])

@@ -171,8 +171,9 @@ std::string work_answer(const RunsByCase& all) {
     if (speedup_over_tuned(runs_of(list, method_names[order_2]), list).median > 1.0) ++faster;
   }
   char title[160];
-  std::snprintf(title, sizeof title, "For the same error order 2 takes less time than the best tuned penalty in %d of %zu motions",
-                faster, all.size());
+  std::snprintf(title, sizeof title,
+                "For the same error order 2 takes less time than the best tuned penalty in %d of %zu motions", faster,
+                all.size());
   return title;
 }
 
@@ -184,9 +185,9 @@ std::string glance_answer(const RunsByCase& all) {
     return 1e6 * worst_m;
   };
   char title[160];
-  std::snprintf(title, sizeof title,
-                "At 1 ms order 2 is within %.3g µm in every motion, the best penalty method within %.3g µm",
-                worst_um(order_2), std::min({worst_um(penalty_euler), worst_um(penalty_rk4), worst_um(penalty_implicit)}));
+  std::snprintf(
+      title, sizeof title, "At 1 ms order 2 is within %.3g µm in every motion, the best penalty method within %.3g µm",
+      worst_um(order_2), std::min({worst_um(penalty_euler), worst_um(penalty_rk4), worst_um(penalty_implicit)}));
   return title;
 }
 
@@ -332,11 +333,7 @@ std::vector<std::string> ErrorStudy::plot(const Table& table, const Options& /*o
                                           const std::filesystem::path& out) const {
   const RunsByCase all = collect(table);
   const Fixed fixed = best_fixed(all);
-  Chart work{.title = work_answer(all),
-             .columns = 2,
-             .panel_width = 640,
-             .panel_height = 420,
-             .common_key = true};
+  Chart work{.title = work_answer(all), .columns = 2, .panel_width = 640, .panel_height = 420, .common_key = true};
   Chart order = work;
   order.title = "Position error against timestep";
   for (const ErrorCase& which : error_cases()) {

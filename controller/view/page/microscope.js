@@ -10,6 +10,7 @@ const BAR_PX = 64;                    // at least so long, at most 2.5 times
 const STEPS = [1, 2, 5];
 const FONT = '11px system-ui, "DejaVu Sans", sans-serif';
 const MOST_TIMES = 20;                // the other side, of what else is in the picture
+const BORDER = 12;                     // what is too far aside stands so far from it
 const MARGIN = 30;                    // between what is furthest away and the border
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -98,11 +99,13 @@ export class Microscope {
   // The longest bar of the table with which everything is within the picture, kept while it fits well enough.
   scale(room) {
     const places = ['proxy', 'tool', 'steel'].filter((name) => this.section[name]).map((name) => this.section[name]);
-    let far = Math.max(LEAST_M / 20, ...places.map(([x, y]) => Math.max(Math.abs(x) / 1.3, Math.abs(y))));
-    // The other side is seen unless all else would become too small for that; its number stands there anyway.
-    if (this.section.other < MOST_TIMES * far || this.section.other < MOST_TIMES * LEAST_M) far = Math.max(far, this.section.other);
+    const { other } = this.section, up = Math.max(LEAST_M / 20, ...places.map(([, y]) => Math.abs(y)));
+    // The other side is seen unless all else would become too small for that; its number stands there anyway. What is
+    // further aside than there is room stands at the border then.
+    const fit = other < MOST_TIMES * up || other < MOST_TIMES * LEAST_M;
+    const far = fit ? Math.max(up, other) : Math.max(up, ...places.map(([x]) => Math.abs(x) / 1.3));
     const fits = (bar) => (far / bar) * BAR_PX <= room;
-    const keeps = fits(this.bar_m) && (far / this.bar_m) * BAR_PX > 0.12 * room;
+    const keeps = fits(this.bar_m) && (far / this.bar_m) * BAR_PX > 0.2 * room;
     if (!keeps) this.bar_m = BARS.find(fits) ?? MOST_M;
     return BAR_PX / this.bar_m;
   }
@@ -115,7 +118,7 @@ export class Microscope {
     this.drawSolid(width, y0, height, 1);
     const above = y0 - scale * this.section.other;
     if (above > 0) this.drawSolid(width, above, 0, -1);
-    const at = ([aside, up]) => [x0 + scale * aside, y0 - scale * up];
+    const at = ([aside, up]) => [Math.min(width - BORDER, Math.max(BORDER, x0 + scale * aside)), y0 - scale * up];
     const { proxy, tool, steel } = this.section;
     this.leash(at(proxy), at(tool));
     this.ring(at(proxy), 5, colour(slips ? '--slip' : '--stick'), true);
@@ -188,6 +191,9 @@ export class Microscope {
     if (steel) lines.push(`× steel ${place(steel)}`);
     const fit = other < LEAST_M / 20 ? 'none' : length(other);
     if (Number.isFinite(other)) lines.unshift(narrow ? `room ${fit}` : `room to the other side: ${fit}`);
+    // A phone's picture is narrow.
+    const widest = Math.max(...lines.map((line) => c.measureText(line).width));
+    if (widest > width - 12) c.font = c.font.replace(/[\d.]+px/, `${(((narrow ? 10 : 11) * (width - 12)) / widest).toFixed(1)}px`);
     lines.forEach((line, i) => c.fillText(line, 8, height - 8 - 14 * (lines.length - 1 - i)));
     const bar = scale * this.bar_m, right = width - 10;
     c.strokeStyle = colour('--ink');

@@ -45,7 +45,7 @@ struct Moment {
   double contact_peak_N = 0.0;    // the world's largest force
   std::uint64_t overruns = 0;     // since the session began
   Blow blow;                      // of the last touch
-  std::optional<Room> room;                                    // none: nothing is within Room::most_m
+  std::optional<Room> room;       // none: nothing is within Room::most_m
   models::Quaternion tool_q = models::Quaternion::Identity();  // of the tool in W, by the encoders
 };
 

@@ -100,7 +100,7 @@ double way_to_other_side(const Gap& gap_m, const Vec3& normal) {
 }  // namespace
 
 std::optional<Room> Stage::room(const CycleRecord& record, double rendered_s) const {
-  if (record.phase != controller::Phase::rendering) return std::nullopt;
+  if (record.phase != controller::Phase::rendering || options_.arm_alone) return std::nullopt;
   const Vec3 proxy = controller::vec3(record.proxy_W_m);
   const models::Quaternion q(record.proxy_q_W.data());
   const auto gap_m = [&](const Vec3& moved) {

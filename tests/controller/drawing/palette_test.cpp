@@ -66,8 +66,8 @@ const std::vector<std::vector<const char*>> together{{"proxy", "tool", "hand", "
                                                      {"stick", "slip", "bad", "soft", "ink"},
                                                      {"good", "hand", "ink"},
                                                      {"margin-1", "margin-2", "margin-3", "margin-4"}};
-const std::vector<const char*> marks{"proxy", "tool", "hand", "stick", "slip", "good", "bad", "accent",
-                                     "margin-1", "margin-2", "margin-3", "margin-4"};
+const std::vector<const char*> marks{"proxy", "tool",   "hand",     "stick",    "slip",     "good",
+                                     "bad",   "accent", "margin-1", "margin-2", "margin-3", "margin-4"};
 
 TEST(Palette, TextIsReadable) {  // WCAG 2.1, 1.4.3
   for (const bool dark : {false, true}) {
