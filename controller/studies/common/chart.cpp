@@ -302,8 +302,8 @@ std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
       const std::array<double, 2> place = place_in(map, line.label_x, line.label_y);
       if (!is_room(labelled, place)) continue;
       labelled.push_back(place);
-      gp << "set label " << label++ << " '" << level << "' at graph " << std::clamp(place[0], 0.05, 0.95) << ", graph "
-         << std::clamp(place[1], 0.06, 0.94) << " center front font 'sans,17' boxed\n";
+      gp << "set label " << label++ << " '" << level << "' at graph " << std::clamp(place[0], 0.08, 0.92) << ", graph "
+         << std::clamp(place[1], 0.08, 0.92) << " center front font 'sans,17' boxed\n";
     }
     gp << "set style textbox opaque noborder fillcolor rgb '#ffffff'\n" << plot << "\nunset label\n";
   }
