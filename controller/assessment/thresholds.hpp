@@ -1,14 +1,19 @@
-// Forces that a body region may bear, read from a file that names their source.
+// What a hand bears and what it notices, read from a file that names its sources.
 //
 //   source: "…"                    # standard, year, table, and where it was read; printed with each figure
 //   regions:
 //     - {name: hands and fingers, stiffness_N_per_mm: 75, quasi_static_N: 140, transient_N: 280}
+//   vibration:                     # optional
+//     source: "…"
+//     points:                      # 2 to 100, by frequency
+//       - {frequency_Hz: 10, amplitude_um: 3}
 //
 // A region is judged against a body of its own stiffness. Pressures aren't judged, since they depend on the shapes of
 // the parts, which a cell file doesn't have.
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,10 +26,24 @@ struct Region {
   double quasi_static_N = 0.0;  // after that
 };
 
+// From which amplitude on a hand notices a vibration of what it grasps.
+struct VibrationThreshold {
+  struct Point {
+    double frequency_Hz = 0.0;
+    double amplitude_m = 0.0;  // half of peak to peak
+  };
+  std::string source;
+  std::vector<Point> points;  // at least two, by rising frequency
+
+  // Between the points, both axes logarithmic; none beyond them.
+  [[nodiscard]] std::optional<double> amplitude_m(double frequency_Hz) const;
+};
+
 struct Thresholds {
   std::filesystem::path file;
   std::string source;
   std::vector<Region> regions;
+  std::optional<VibrationThreshold> vibration = std::nullopt;
 };
 
 // A contact counts as quasi-static from this time after its beginning on, in seconds.

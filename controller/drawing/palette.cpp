@@ -31,6 +31,11 @@ constexpr Colour table[] = {
     {"good", "#00724f", "#4fd1a5"},
     {"bad", "#a3001f", "#ff5c72"},
     {"bad-paper", "#fdecea", "#3a1a1a"},
+    // How far from swinging, from what may swing to what is far from it.
+    {"margin-1", "#a3001f", "#ff5c72"},
+    {"margin-2", "#b35900", "#ffc61a"},
+    {"margin-3", "#0072b2", "#56b4e9"},
+    {"margin-4", "#0b2e52", "#e8edf2"},
     // Bodies, shaded by the light: their edges and grids tell what they are.
     {"arm", "#e3e8ed", "#8fa0b1"},
     {"arm-joint", "#94a3b2", "#5d6e80"},

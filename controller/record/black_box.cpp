@@ -21,10 +21,12 @@ constexpr double shortest_period_s = 250e-6;
 }  // namespace
 
 void BoxReader::lay_out(Head* head) noexcept {
-  static_assert(alignof(BoxCycle) <= 8 && alignof(BoxFrame) <= 8 && alignof(State) <= 8 && sizeof(Head) % 8 == 0);
+  static_assert(alignof(BoxCycle) <= 8 && alignof(BoxFrame) <= 8 && alignof(BoxTruth) <= 8 && alignof(State) <= 8 &&
+                sizeof(Head) % 8 == 0);
   head_ = head;
   cycles_ = reinterpret_cast<BoxCycle*>(reinterpret_cast<std::byte*>(head) + sizeof(Head));
-  frames_ = reinterpret_cast<BoxFrame*>(cycles_ + head->cycle_capacity);
+  truths_ = reinterpret_cast<BoxTruth*>(cycles_ + head->cycle_capacity);
+  frames_ = reinterpret_cast<BoxFrame*>(truths_ + head->cycle_capacity);
   states_ = reinterpret_cast<State*>(frames_ + head->frame_capacity);
 }
 
@@ -100,6 +102,13 @@ void BlackBox::finish() noexcept {
   head_->cycles.store(at + 1, std::memory_order_release);
 }
 
+void BlackBox::add_truth(const Triple& tool_m, const std::array<double, 4>& tool_q) noexcept {
+  const std::uint64_t end = head_->cycles.load(std::memory_order_relaxed);
+  if (end == 0) return;
+  truths_[(end - 1) % head_->cycle_capacity] = {end - 1, tool_m, tool_q};
+  head_->truths.store(end, std::memory_order_release);
+}
+
 std::span<std::byte> BlackBox::state_room() noexcept {
   if (head_->cycles.load(std::memory_order_relaxed) % cycles_per_state_ != 0) return {};
   return states_[head_->states.load(std::memory_order_relaxed) % state_count].bytes;
@@ -126,6 +135,12 @@ bool BoxReader::read(std::uint64_t cycle, BoxCycle& out) const noexcept {
   if (cycle >= cycles() || cycle < oldest_cycle()) return false;
   out = cycles_[cycle % head_->cycle_capacity];
   return cycle >= oldest_cycle();
+}
+
+bool BoxReader::truth(std::uint64_t cycle, BoxTruth& out) const noexcept {
+  if (cycle >= truths() || cycle < oldest_cycle()) return false;
+  out = truths_[cycle % head_->cycle_capacity];
+  return out.cycle == cycle && cycle >= oldest_cycle();
 }
 
 bool BoxReader::read(std::uint64_t cycle, BoxCycle& out, std::vector<BoxFrame>& frames) const {

@@ -2,10 +2,11 @@
 //
 // The cycle writes here (noexcept, no lock, no allocation, no system call; every page is touched beforehand). The
 // memory is a shared mapping, so that a process that was forked off before still has it when this one has died
-// (command_line/black_box_keeper.hpp), and a process that is given its descriptor can read it (MappedBox). Three rings,
+// (command_line/black_box_keeper.hpp), and a process that is given its descriptor can read it (MappedBox). Four rings,
 // overwritten from their oldest end:
 //   cycles   one entry per cycle: what came in by other ways than frames, and the cycle's record
 //   frames   all that was received and sent, in order
+//   truths   of a simulation: where the tool truly is, which the cycle doesn't know; written beside it, for who watches
 //   states   the controller's whole state at the begin of a cycle, once a second: where a replay can start
 #pragma once
 
@@ -57,7 +58,15 @@ struct BoxCycle {
   CycleRecord record;
 };
 
-static_assert(std::is_trivially_copyable_v<BoxCycle> && std::is_trivially_copyable_v<BoxFrame>);
+// A simulated tool at a cycle's begin, in W.
+struct BoxTruth {
+  std::uint64_t cycle = 0;  // counted from the first one
+  Triple tool_m{};
+  std::array<double, 4> tool_q{0.0, 0.0, 0.0, 1.0};  // x y z w
+};
+
+static_assert(std::is_trivially_copyable_v<BoxCycle> && std::is_trivially_copyable_v<BoxFrame> &&
+              std::is_trivially_copyable_v<BoxTruth>);
 
 // The cycle's side of it.
 class CycleBox {
@@ -90,6 +99,10 @@ class BoxReader {
   // The same without its frames.
   bool read(std::uint64_t cycle, BoxCycle& out) const noexcept;
   [[nodiscard]] std::uint64_t oldest_cycle() const noexcept;
+  // Up to which cycle the truth is told; 0: nobody tells it.
+  [[nodiscard]] std::uint64_t truths() const noexcept { return head_->truths.load(std::memory_order_acquire); }
+  // False where it isn't there (any more).
+  bool truth(std::uint64_t cycle, BoxTruth& out) const noexcept;
   // The oldest state from which all cycles are still there. False where there is none.
   bool oldest_state(std::uint64_t& cycle, std::vector<std::byte>& state) const;
   // The frames of a cycle that was begun and never ended.
@@ -105,7 +118,7 @@ class BoxReader {
   struct Head {
     std::uint64_t layout = 0;  // of the program that wrote it: layout_of_this_program()
     std::uint64_t cycle_capacity = 0, frame_capacity = 0;
-    std::atomic<std::uint64_t> cycles{0}, frames{0}, states{0};
+    std::atomic<std::uint64_t> cycles{0}, frames{0}, states{0}, truths{0};
   };
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
   // Another build may have other records.
@@ -116,13 +129,15 @@ class BoxReader {
   BoxReader() = default;
   ~BoxReader() = default;
   [[nodiscard]] static std::size_t bytes_for(std::size_t cycles, std::size_t frames) noexcept {
-    return sizeof(Head) + cycles * sizeof(BoxCycle) + frames * sizeof(BoxFrame) + state_count * sizeof(State);
+    return sizeof(Head) + cycles * (sizeof(BoxCycle) + sizeof(BoxTruth)) + frames * sizeof(BoxFrame) +
+           state_count * sizeof(State);
   }
   // The rings within the memory that begins with `head`, which has the capacities.
   void lay_out(Head* head) noexcept;
 
   Head* head_ = nullptr;
   BoxCycle* cycles_ = nullptr;
+  BoxTruth* truths_ = nullptr;
   BoxFrame* frames_ = nullptr;
   State* states_ = nullptr;
 };
@@ -145,6 +160,8 @@ class BlackBox final : public CycleBox, public BoxReader {
   void finish() noexcept override;
   [[nodiscard]] std::span<std::byte> state_room() noexcept override;
   void finish_state(std::size_t bytes) noexcept override;
+  // Of the newest cycle, by whoever simulates it, after the cycle.
+  void add_truth(const Triple& tool_m, const std::array<double, 4>& tool_q) noexcept;
 
   // Memory::by_descriptor: closed on exec, and with the box; else −1.
   [[nodiscard]] int descriptor() const noexcept { return descriptor_; }

@@ -25,6 +25,8 @@ using models::Vec;
 using nlohmann::json;
 using Vec1 = Vec<1>;
 
+// Sensitivities of the boundary from which on measured and predicted mass aren't compared.
+constexpr double well_conditioned = 3.0;
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
 // Simulates drive, delay and hand of controller/stability/stability.hpp: from the proxy's position to the force that
@@ -360,7 +362,7 @@ json StabilityMap::headline(const Table& table, const Options& /*options*/) cons
     if (p < 0.0) {
       ++none;
       none_disagree += m < 0.0 ? 0 : 1;
-    } else if (!(table.number(row, sensitivity) < 3.0)) {
+    } else if (!(table.number(row, sensitivity) < well_conditioned)) {
       ++ill;
     } else if (!std::isfinite(m)) {
       ++not_found;
@@ -488,7 +490,16 @@ std::vector<std::string> StabilityMap::plot(const Table& table, const Options& o
       chart.maps.push_back(map);
     }
   }
-  Chart agreement{.title = "Measured against predicted boundary", .panel_height = 480};
+  double most = 0.0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double p = value(row, "predicted_kg"), m = value(row, "measured_kg");
+    if (p > 0.0 && std::isfinite(m) && value(row, "sensitivity") < well_conditioned) {
+      most = std::max(most, std::abs(m / p - 1.0));
+    }
+  }
+  char title[120];
+  std::snprintf(title, sizeof title, "Measured and predicted smallest mass differ by at most %.2g %%", 100.0 * most);
+  Chart agreement{.title = title, .panel_width = 1000, .panel_height = 480};
   Panel panel{.x_label = "sensitivity of the boundary to the hand's stiffness, |∂ln M/∂ln K|",
               .y_label = "|measured/predicted − 1|",
               .log_x = true,
@@ -500,7 +511,7 @@ std::vector<std::string> StabilityMap::plot(const Table& table, const Options& o
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const double p = value(row, "predicted_kg"), m = value(row, "measured_kg"), s = value(row, "sensitivity");
     if (!(p > 0.0) || !std::isfinite(m) || row % (table.rows() / 2500 + 1) != 0) continue;
-    Curve& curve = s < 3.0 ? good : bad;
+    Curve& curve = s < well_conditioned ? good : bad;
     curve.x.push_back(std::max(s, 1e-4));
     curve.y.push_back(std::max(std::abs(m / p - 1.0), 2e-7));
   }

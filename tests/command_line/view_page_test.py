@@ -500,6 +500,32 @@ class Page(ProgramTest):
             browser.until("document.getElementById('microscope').hidden", "without it")
             self.assertEqual(browser.complaints(), [])
 
+    def test_the_steel_is_shown_while_a_simulation_runs(self):
+        """It was seen in records alone."""
+        told = """const { section, box, touched, moment } = proxarm.microscope;
+                  return !box.hidden && touched && section.steel ? [moment.cycle, section.steel[1], moment.tool_clearance_m] : null"""
+        with view_browser.Browser() as browser:
+            with Session(self.folder, "run", "--no-plot", "--record", "session", "--duration", "5s", "--view",
+                         "--pace", "realtime") as session:
+                self.opened(browser, session)
+                browser.until(f"(() => {{ {told} }})()", "the touch")
+                live = []
+                for _ in range(15):
+                    live.append(browser.run(told))
+                    time.sleep(0.05)
+                session.until_said("until Ctrl-C")
+            self.assertEqual(browser.complaints(), [])
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            rows = {int(row["cycle"]): row for row in csv.DictReader(file)}
+        live = [one for one in live if one]
+        self.assertGreater(len(live), 5)
+        for cycle, up, clearance in live:
+            row = rows[cycle]
+            self.assertAlmostEqual(up, sum((float(row[f"true_tool_W_{axis}_m"]) - float(row[f"proxy_W_{axis}_m"])) *
+                                           float(row[f"normal_W_{axis}_1"]) for axis in "xyz"), delta=1e-8)
+            self.assertAlmostEqual(clearance, float(row["tool_clearance_m"]), delta=1e-6)
+        self.assertLess(min(up for _, up, _ in live), -1e-6)
+
     def test_what_is_felt_stands_beside_what_is_meant(self):
         """A mass by force over acceleration, and a layer's spring by force over depth, both as the scene has them."""
         self.call("run", "--no-plot", "--record", "shaken", "--duration", "8s", "--scene", SOURCE / "scenes/free.yaml",
@@ -526,6 +552,195 @@ class Page(ProgramTest):
                 browser.run("document.getElementById('felt').scrollIntoView({ block: 'end' })")
                 time.sleep(0.5)
                 browser.picture("felt-light")
+            self.assertEqual(browser.complaints(), [])
+
+    def heard(self, rows, band):
+        """Amplitude in a third-octave band of a second of places, by the definition: the Fourier sum of each line of a
+        window of Hann's over the places, their straight trend taken off; in µm."""
+        count = len(rows)
+        window = [0.5 - 0.5 * math.cos(2 * math.pi * i / count) for i in range(count)]
+        power = 0.0
+        for axis in "xyz":
+            places = [float(row[f"true_tool_W_{axis}_m"]) for row in rows]
+            middle, mean = (count - 1) / 2, sum(places) / count
+            slope = sum((i - middle) * place for i, place in enumerate(places)) / sum((i - middle) ** 2 for i in range(count))
+            rest = [w * (place - mean - slope * (i - middle)) for i, (w, place) in enumerate(zip(window, places))]
+            for line in range(math.ceil(band / 10 ** 0.05), math.ceil(band * 10 ** 0.05)):
+                turn = [2 * math.pi * line * i / count for i in range(count)]
+                power += (sum(x * math.cos(a) for x, a in zip(rest, turn)) ** 2 +
+                          sum(x * math.sin(a) for x, a in zip(rest, turn)) ** 2) * (2 / sum(window)) ** 2
+        return 1e6 * math.sqrt(power / 1.5)
+
+    def test_the_handles_spectrum_stands_beside_what_a_hand_notices(self):
+        self.call("run", "--no-plot", "--record", "session", "--duration", "5s")
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        at = next(i for i, row in enumerate(rows) if row["contact"] != "free") + 600
+        text = (SOURCE / "models/thresholds/hands.yaml").read_text()
+        points = [[float(x) for x in pair] for pair in re.findall(r"frequency_Hz: ([\d.]+), amplitude_um: ([\d.]+)", text)]
+        with view_browser.Browser() as browser, Session(self.folder, "view", "session") as session:
+            self.opened(browser, session)
+            told = browser.run("return proxarm.spectrum.points")
+            self.assertEqual(len(told), len(points))
+            for (f, um), (f_told, um_told) in zip(points, told):
+                self.assertAlmostEqual(f, f_told)
+                self.assertAlmostEqual(um, um_told, places=9)
+            browser.run(f"proxarm.player.goTo({at})")
+            browser.until(f"proxarm.player.isShown({at}) && proxarm.player.heard === {at} && proxarm.spectrum.at === {at}",
+                          "what is heard there")
+            bands = browser.run("return proxarm.spectrum.bands")
+            self.assertEqual([round(band["centre_Hz"]) for band in bands],
+                             [10, 13, 16, 20, 25, 32, 40, 50, 63, 79, 100, 126, 158, 200, 251, 316, 398])
+            second = rows[at - 1000:at]
+            self.assertTrue(all(row["phase"] == "rendering" for row in second))
+            for band in bands[3:12:2]:  # lower ones have the hand's own motion, which a trend doesn't take off
+                self.assertAlmostEqual(self.heard(second, band["centre_Hz"]) / band["amplitude_um"], 1.0, delta=0.1,
+                                       msg=band["centre_Hz"])
+            loudest = max(bands, key=lambda band: band["amplitude_um"] / band["threshold_um"])
+            ratio = loudest["amplitude_um"] / loudest["threshold_um"]
+            words = browser.run("return document.querySelector('#vibration p').textContent")
+            self.assertTrue(words.startswith("a hand notices " if ratio >= 1 else "no hand notices "), words)
+            self.assertIn(f" at {loudest['frequency_Hz']:.0f} Hz, of the steel", words)
+            self.assertIn("Brisben", browser.run("return document.getElementById('vibration').title"))
+            browser.run("document.getElementById('vibration').scrollIntoView({ block: 'end' })")
+            time.sleep(0.3)
+            browser.picture("vibration-light")
+            # Of the first second nothing is told.
+            first = next(i for i, row in enumerate(rows) if row["phase"] == "rendering")
+            browser.run(f"proxarm.player.goTo({first + 500})")
+            browser.until(f"proxarm.spectrum.at === {first + 500}", "the beginning")
+            self.assertEqual(browser.run("return proxarm.spectrum.bands"), [])
+            self.assertEqual(browser.run("return document.querySelector('#vibration p').textContent"),
+                             "after a second of rendering without a break")
+            self.assertEqual(browser.complaints(), [])
+        with view_browser.Browser(dark=True) as browser, \
+                Session(self.folder, "run", "--view", "--no-plot", "--duration", "60s") as session:
+            self.opened(browser, session)
+            browser.until("proxarm.spectrum.bands.length === 17 && proxarm.spectrum.of === 'steel'", "the spectrum, live")
+            browser.run("document.getElementById('vibration').scrollIntoView({ block: 'end' })")
+            time.sleep(0.3)
+            browser.picture("vibration-dark")
+            self.assertEqual(browser.complaints(), [])
+
+    def assert_dots_are_of_the_judge(self, browser, places):
+        """Each dot of the way has the class of the place that was judged last."""
+        counts, way, shown = browser.run("""
+            const { margins } = proxarm.world;
+            return [margins.counts, margins.way.map(({ time_s }) => time_s), margins.dots.map((dots) => dots.visible)];""")
+        wanted = [0, 0, 0, 0]
+        for time_s in way:
+            judged = [place for place in places if place["time_s"] <= time_s + 1e-9]
+            if not judged:
+                continue
+            smallest = judged[-1]["smallest_stable_mass_kg"]
+            ratio = judged[-1]["felt_mass_kg"] / smallest if smallest else 0
+            wanted[0 if ratio < 1 else 1 if ratio < 1.5 else 2 if ratio < 3 else 3] += 1
+        self.assertEqual(counts, wanted)
+        self.assertGreater(sum(counts), 50)
+        self.assertEqual(shown, [count > 0 for count in counts])
+
+    def test_how_far_from_swinging_is_colour_along_the_way(self):
+        arguments = ("run", "--no-plot", "--record", "session", "--duration", "6s", "--mass", "3kg")
+        with view_browser.Browser() as browser:
+            with Session(self.folder, *arguments, "--view", "--pace", "realtime") as session:
+                self.opened(browser, session)
+                browser.until("proxarm.world.margins?.counts?.some(Boolean)", "colour, live")
+                legend = browser.run("return document.getElementById('margin-legend').innerText")
+                for words in ("mass over the smallest stable", "may swing", "1 to 1.5", "1.5 to 3", "over 3"):
+                    self.assertIn(words, legend)
+                session.until_said("until Ctrl-C")
+            self.assertEqual(browser.complaints(), [])
+        with open(self.folder / "session" / "summary.json") as file:
+            places = json.load(file)["poses"]["places"]
+        for dark in (False, True):
+            with view_browser.Browser(dark=dark) as browser, Session(self.folder, "view", "session") as session:
+                self.opened(browser, session)
+                browser.until("proxarm.world.margins.counts?.some(Boolean)", "the way")
+                self.assert_dots_are_of_the_judge(browser, places)
+                legend, dots = browser.run("""
+                    const paint = (i) => proxarm.world.margins.dots[i].material.color.getHexString();
+                    return [[...document.querySelectorAll('#margin-legend i')].map((dot) => getComputedStyle(dot).backgroundColor),
+                            [0, 1, 2, 3].map(paint)];""")
+                self.assertEqual([[int(part) for part in re.findall(r"\d+", words)] for words in legend],
+                                 [[int(paint[i:i + 2], 16) for i in (0, 2, 4)] for paint in dots])
+                browser.run("proxarm.world.look('tool'); proxarm.world.drawFine()")
+                browser.until("!proxarm.world.changed", "a fine picture")
+                browser.picture("margins-dark" if dark else "margins-light")
+                self.assertEqual(browser.complaints(), [])
+
+    def test_the_microscope_shows_both_sides_of_a_fit(self):
+        """A peg of 20 mm g6 in a bore of 20 mm H7 has 24 µm; both sides were never seen at once."""
+        arguments = ("run", "--no-plot", "--record", "peg", "--duration", "5s", "--inertia", "0.05", "--scene",
+                     SOURCE / "scenes/peg_in_hole.yaml", "--hand", SOURCE / "sim/hands/insert.yaml")
+        told = """const { section, box, touched } = proxarm.microscope, { cycle } = proxarm.microscope.moment ?? {};
+                  return box.hidden ? null : [cycle, section.other, section.proxy[1], section.tool, section.steel ?? null, touched]"""
+        with view_browser.Browser() as browser:
+            with Session(self.folder, *arguments, "--view", "--pace", "realtime") as session:
+                self.opened(browser, session)
+                browser.until(f"(() => {{ {told} }})()", "the fit, live")
+                live = []
+                for _ in range(30):
+                    live.append(browser.run(told))
+                    time.sleep(0.05)
+                browser.picture("fit-live")
+                session.until_said("until Ctrl-C")
+            self.assertTrue(all(live), "the peg is in its bore all the time")
+            # Before it is pressed askew it is as far from one side as the other lets it: 24 µm in all.
+            self.assertTrue(any(abs(one[1] - 24e-6) < 1e-6 for one in live), live)
+            self.assertTrue(all(-1e-7 <= one[1] < 25e-6 for one in live), live)
+            self.assertTrue(all(one[4] for one in live), "the steel, which a simulation tells while it runs")
+            with open(self.folder / "peg" / "signals.csv", newline="") as file:
+                rows = {int(row["cycle"]): row for row in csv.DictReader(file)}
+            for cycle, _, proxy, tool, steel, touched in live:
+                if touched:
+                    continue
+                part = lambda name: [float(rows[cycle][f"{name}_W_{axis}_m"]) for axis in "xyz"]
+                self.assertAlmostEqual(math.hypot(*tool), math.dist(part("tool"), part("proxy")), delta=1e-9)
+                self.assertLess(math.hypot(*steel), math.dist(part("true_tool"), part("proxy")) + 1e-9)
+                self.assertGreaterEqual(proxy, 0)
+            for size, dark in (((1280, 720), False), ((390, 844), True)):
+                with self.subTest(size), Session(self.folder, "view", "peg") as session, \
+                        view_browser.Browser(*size, dark=dark) as other:
+                    self.opened(other, session)
+                    fits = {}
+                    for index in range(1000, len(rows), 150):
+                        other.run(f"proxarm.player.goTo({index})")
+                        other.until(f"proxarm.microscope.moment?.cycle === {list(rows)[index]}", "that cycle")
+                        fits[index] = other.run(told)[1]
+                    self.assertLess(max(fits.values()), 24.1e-6)
+                    self.assertLess(min(fits.values()), 5e-6, "held askew it has less room")
+                    straight = max(fits, key=fits.get)
+                    other.run(f"proxarm.player.goTo({straight})")
+                    other.until(f"proxarm.player.isShown({straight})", "that cycle")
+                    self.assertAlmostEqual(other.run("return proxarm.microscope.section.other"), 24e-6, delta=1e-6)
+                    # It is wide enough to be seen.
+                    self.assertTrue(10e-6 <= other.run("return proxarm.microscope.bar_m") <= 100e-6)
+                    other.picture(f"fit-{size[0]}")
+                    self.assertEqual(other.complaints(), [])
+            self.assertEqual(browser.complaints(), [])
+
+    def test_a_cycle_of_force_over_depth_has_its_energy(self):
+        """F = k x + c ẋ with x = a + A sin ωt takes π c ω A² of each cycle, whatever k is."""
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view", "--no-plot", "--pace", "virtual", "--duration", "1s") as session:
+            session.until_said("until Ctrl-C")
+            self.opened(browser, session)
+
+            def energy(damping, turns=3.3, amplitude=0.5):
+                points = []
+                for i in range(300):
+                    angle = 2 * math.pi * turns * i / 299 - 1.2
+                    x, v = 1 + amplitude * math.sin(angle), amplitude * 2 * math.pi * 2 * math.cos(angle)  # mm, mm/s: 2 Hz
+                    points.append([x, 3.0 * x + damping * v])
+                return browser.run("""return import('./felt.js').then(({ cycleOf }) => cycleOf(arguments[0])?.energy_mJ ?? null)
+                                   """.replace("arguments[0]", json.dumps(points)))
+
+            for damping in (0.05, -0.05, 0.4):
+                self.assertAlmostEqual(energy(damping), math.pi * damping * 2 * math.pi * 2 * 0.25,
+                                       delta=0.01 * math.pi * 4 * math.pi * 0.25 * abs(damping))
+            self.assertAlmostEqual(energy(0.0), 0.0, places=9)
+            self.assertIsNone(energy(0.05, turns=0.8), "no whole cycle")
+            self.assertIsNone(energy(0.05, amplitude=2e-4), "noise")
             self.assertEqual(browser.complaints(), [])
 
     def test_a_unit_may_be_typed(self):

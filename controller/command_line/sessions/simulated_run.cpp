@@ -137,6 +137,7 @@ void SimulatedRun::drain(controller::SpscRing<CycleRecord>& records) {
   CycleRecord record;
   while (records.pop(record)) {
     controller::add_truth(record, truth_);
+    keeper_.box().add_truth(record.true_tool_W_m, record.true_tool_q_W);
     const CycleRecord completed = output_.add(record);
     if (messages_) messages_->add(completed);
   }

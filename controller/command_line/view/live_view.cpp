@@ -18,6 +18,7 @@
 #include "controller/command_line/view/page_channel.hpp"
 #include "controller/command_line/view/page_files.hpp"
 #include "controller/command_line/view/tool_channel.hpp"
+#include "controller/command_line/view/vibration.hpp"
 #include "controller/view/sources/live_source.hpp"
 #include "controller/view/stage/words.hpp"
 #include "controller/view/web/gate.hpp"
@@ -32,6 +33,7 @@ using boost::system::error_code;
 using nlohmann::json;
 
 constexpr auto between_moments = std::chrono::microseconds(16'667);  // 60 a second
+constexpr auto between_spectra = std::chrono::milliseconds(250);
 
 scenes::Scene scene_of(const json& hello) {
   const auto file = hello.at("scene").get<std::string>();
@@ -111,6 +113,7 @@ class LiveView {
     stage["mode"] = stage_.options().arm_alone ? "arm" : "live";
     stage["control"] = control_.open();
     stage["settings"] = settings_of(source_.settings());
+    stage["threshold"] = threshold_json(threshold_);
     socket.say(text_of({{"stage", stage}}), false);
     socket.say(std::make_shared<const std::string>(view::encode_history(source_.history())), true);
     socket.say(text_of({{"status", status_}}), false);
@@ -126,12 +129,24 @@ class LiveView {
         tell_fault(view::fault_text(last_->record, stage_.cell()));
         tools_.show(*last_);
         if (source_.have_settings_changed()) page_.say(text_of({{"settings", settings_of(source_.settings())}}));
-        if (!page_.empty()) page_.show(std::make_shared<const std::string>(source_.encode(*last_)));
+        if (!page_.empty()) {
+          page_.show(std::make_shared<const std::string>(source_.encode(*last_)));
+          tell_spectrum();
+        }
       }
       // A machine that is too slow for 60 a second has fewer, not a backlog.
       timer_.expires_at(std::max(timer_.expiry() + between_moments, std::chrono::steady_clock::now()));
       show();
     });
+  }
+
+  // A transform of a second takes some milliseconds, and nobody reads bars that change faster.
+  void tell_spectrum() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_spectrum_ || stage_.options().arm_alone) return;
+    next_spectrum_ = now + between_spectra;
+    const bool of_truth = last_->record.has(controller::RecordFlag::truth);
+    page_.say(text_of({{"spectrum", spectrum_json(source_.spectrum(), of_truth, threshold_)}}));
   }
 
   void tell_fault(const std::string& text) {
@@ -172,6 +187,8 @@ class LiveView {
   boost::asio::streambuf lines_{65536};
   json status_{{"fault", ""}, {"ended", ""}};
   std::optional<view::Moment> last_;
+  assessment::VibrationThreshold threshold_ = vibration_threshold();
+  std::chrono::steady_clock::time_point next_spectrum_{};
   bool stepped_back_ = false;
 };
 

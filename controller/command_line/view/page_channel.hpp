@@ -1,7 +1,8 @@
 // What the page and the process say to each other over its WebSocket.
 //
 // To the page: text, JSON with one key: "stage" (view/stage/stage.hpp, and "mode" and "control"), "settings"
-// where they have changed (view/stage/present_settings.hpp), "status", "answer";
+// where they have changed (view/stage/present_settings.hpp), "status", "answer", and of a running session "spectrum"
+// four times a second (vibration.hpp);
 // binary, moments and histories (view/stage/moment.hpp). From the page: JSON {"ask": LINE, "id": N}, a line for the
 // session's control socket, answered by {"answer": {"id": N, "text": …}}; of a record what play_view.hpp says.
 #pragma once

@@ -10,6 +10,7 @@
 #include "controller/command_line/live/browser.hpp"
 #include "controller/command_line/view/page_channel.hpp"
 #include "controller/command_line/view/page_files.hpp"
+#include "controller/command_line/view/vibration.hpp"
 #include "controller/record/replay_log.hpp"
 #include "controller/view/sources/frame_words.hpp"
 #include "controller/view/sources/recorded_session.hpp"
@@ -84,6 +85,7 @@ class PlayView {
                        {"from_s", session_.time_s(0)},        {"to_s", session_.time_s(session_.size() - 1)},
                        {"open_at", session_.opening()},       {"events", events},
                        {"margins", margins_of(folder_)}};
+    stage["threshold"] = threshold_json(threshold_);
     socket.say(text_of({{"stage", stage}}), false);
     socket.say(history(0, session_.size() - 1, overview_rows), true);
     show(socket, session_.opening());
@@ -140,6 +142,11 @@ class PlayView {
       show(socket, value.get<std::size_t>());
     } else if (name == "frames" && is_index(value)) {
       list_frames(socket, value.get<std::size_t>());
+    } else if (name == "spectrum" && is_index(value)) {
+      const auto index = value.get<std::size_t>();
+      json spectrum = spectrum_json(session_.spectrum(index), session_.has_truth(index), threshold_);
+      spectrum["at"] = index;
+      socket.say(text_of({{"spectrum", spectrum}}), false);
     } else if (name == "window" && value.is_array() && value.size() == 2 && is_index(value[0]) && is_index(value[1])) {
       socket.say(history(value[0].get<std::size_t>(), value[1].get<std::size_t>(), window_rows), true);
     } else {
@@ -154,6 +161,7 @@ class PlayView {
   ControlLine control_;
   PageChannel page_;
   view::WebServer server_;
+  assessment::VibrationThreshold threshold_ = vibration_threshold();
 };
 
 }  // namespace

@@ -3,6 +3,8 @@
 // Every page has a place in the record of its own, and asks for what it shows:
 //   {"at": INDEX}             the moment of that cycle
 //   {"frames": INDEX}         {"frames": {"at": INDEX, "list": [{bus, id, bytes, from, words}, …]}}
+//   {"spectrum": INDEX}       {"spectrum": {"at": INDEX, …}}: the handle's vibration of the second before
+//   (vibration.hpp)
 //   {"window": [FROM, TO]}    a history of at most 800 rows
 #pragma once
 

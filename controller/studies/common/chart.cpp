@@ -119,6 +119,7 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
   gp << "set grid lc rgb '#c0c0c0' lw 0.6\nset tics scale 0.7\nset multiplot\n"
      << "set label 1000 " << plain(chart.title) << " at screen 0.5, screen " << 1.0 - 26.0 / height
      << " center font 'sans,22'\n";
+  if (rows > 1) gp << "set lmargin 10\n";  // panels that stand below each other begin at the same place
   std::size_t block = 0;
   for (std::size_t i = 0; i < chart.panels.size(); ++i) {
     const Panel& panel = chart.panels[i];
@@ -301,8 +302,8 @@ std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
       const std::array<double, 2> place = place_in(map, line.label_x, line.label_y);
       if (!is_room(labelled, place)) continue;
       labelled.push_back(place);
-      gp << "set label " << label++ << " '" << level << "' at graph " << std::clamp(place[0], 0.05, 0.95) << ", graph "
-         << std::clamp(place[1], 0.06, 0.94) << " center front font 'sans,17' boxed\n";
+      gp << "set label " << label++ << " '" << level << "' at graph " << std::clamp(place[0], 0.08, 0.92) << ", graph "
+         << std::clamp(place[1], 0.08, 0.92) << " center front font 'sans,17' boxed\n";
     }
     gp << "set style textbox opaque noborder fillcolor rgb '#ffffff'\n" << plot << "\nunset label\n";
   }

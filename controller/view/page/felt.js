@@ -8,6 +8,8 @@ export const NOTICEABLE = 0.1;       // of a force
 const RIGID_N_PER_MM = 42;           // what is stiffer is taken for rigid
 const BLOW_S = 0.05, GAP_S = 0.1;    // of a touch, what isn't in its work; rows that don't follow each other
 const LEAST_M_PER_S2 = 0.05;         // below, it is the encoders' noise
+const CYCLE_BAND = 0.15;             // of a cycle's depth, by which it has to pass its middle on both sides
+const LEAST_CYCLE_MM = 1e-3;         // less deep, it is the encoders' noise
 const BETWEEN_MS = 250;
 const LEFT = 30, BOTTOM = 16, TOP = 18, RIGHT = 6;
 const FONT = '10px system-ui, "DejaVu Sans", sans-serif';
@@ -41,28 +43,56 @@ export function freePoints(rows) {
   return points;
 }
 
-// Of each row in touch: depth in mm, force in N; and what the last touch took of the hand's energy along that way, in mJ:
-// nothing of a wall or a spring, more than nothing of what damps, less of what swings.
+// Of each row in touch: depth in mm, force in N; of the last touch the same; and what it took of the hand's energy along
+// that way, in mJ: nothing of a wall or a spring, more than nothing of what damps, less of what swings.
 // `surface_m`: where depth begins, a layer's thickness above what is rigid.
 export function touchPoints(rows, surface_m = 0) {
   const points = [];
-  let work = NaN, before = null, begun = 0;
+  let work = NaN, before = null, begun = 0, last = [];
   for (const row of rows) {
     const touches = row.contact !== 0 && row.phase === PHASE_RENDERING;
     if (touches && (!before || !following(before, row))) {
       begun = row.time_s;
       work = 0;
+      last = [];
     }
     if (touches && row.time_s - begun > BLOW_S) {
       const depth = 1e3 * (surface_m - row.tool_clearance_m);
       if (before?.depth !== undefined) work += 0.5 * (row.contact_N + before.contact_N) * (depth - before.depth);
       points.push([depth, row.contact_N]);
+      last.push(points[points.length - 1]);
       before = { ...row, depth };
     } else {
       before = touches ? row : null;
     }
   }
-  return { points, work };
+  return { points, work, last };
+}
+
+// The last cycle of a touch that goes in and out: from one time at which it is half-way in to the next, so the loop of force
+// over depth is closed. `energy_mJ`, ∮ F dx, is what it takes of the hand; below 0: gives. Null: it made no cycle.
+export function cycleOf(points) {
+  const depths = points.map(([depth]) => depth), low = Math.min(...depths), high = Math.max(...depths);
+  const half = 0.5 * (low + high), band = CYCLE_BAND * (high - low);
+  if (!(high - low > LEAST_CYCLE_MM)) return null;
+  const passes = [];  // {at, force}: between `at` and the point after it
+  let out = false, pass = null;
+  for (let i = 0; i + 1 < points.length; ++i) {
+    const [d0, f0] = points[i], [d1, f1] = points[i + 1];
+    if (d0 < half - band) out = true;
+    if (d0 < half && d1 >= half) pass = { at: i, force: f0 + ((half - d0) / (d1 - d0)) * (f1 - f0) };
+    if (out && pass && d1 > half + band) {
+      passes.push(pass);
+      out = false;
+      pass = null;
+    }
+  }
+  if (passes.length < 2) return null;
+  const [from, to] = passes.slice(-2);
+  const loop = [[half, from.force], ...points.slice(from.at + 1, to.at + 1), [half, to.force]];
+  let energy_mJ = 0;
+  for (let i = 0; i + 1 < loop.length; ++i) energy_mJ += 0.5 * (loop[i][1] + loop[i + 1][1]) * (loop[i + 1][0] - loop[i][0]);
+  return { energy_mJ, loop };
 }
 
 class Scatter {
@@ -72,7 +102,7 @@ class Scatter {
   }
 
   // `meant(x)`: the force that is meant, and its ground from `low(x)` to `high(x)`; null: none. `wide`: x at the right.
-  draw(title, unit, points, { wide, most, line, ground, from = 0 }) {
+  draw(title, unit, points, { wide, most, line, ground, from = 0, loop = [] }) {
     const c = this.context, { clientWidth: width, clientHeight: height } = this.canvas;
     const ratio = Math.min(2, devicePixelRatio || 1);
     this.canvas.width = Math.round(width * ratio);
@@ -90,6 +120,12 @@ class Scatter {
     c.fill();
     c.fillStyle = colour('--line-felt');
     for (const [u, v] of points) c.fillRect(x(u) - 1, y(v) - 1, 2, 2);
+    c.strokeStyle = colour('--line-contact');
+    c.setLineDash([]);
+    c.lineWidth = 1.4;
+    c.beginPath();
+    loop.forEach(([u, v], i) => (i ? c.lineTo(x(u), y(v)) : c.moveTo(x(u), y(v))));
+    c.stroke();
     c.strokeStyle = colour('--line-wanted');
     c.setLineDash(dash('wanted'));
     c.lineWidth = 1.6;
@@ -107,9 +143,11 @@ class Scatter {
     c.fillText(title, 2, 8);
     c.textAlign = 'right';
     c.fillText(`${Number(most.toPrecision(2))}`, LEFT - 3, TOP + 5);
-    c.fillText(`${Number(wide.toPrecision(2))} ${unit}`, width - RIGHT, height - 7);
+    const widest = `${Number(wide.toPrecision(2))} ${unit}`, least = `${Number(from.toPrecision(2))}`.replace('-', '−');
+    c.fillText(widest, width - RIGHT, height - 7);
     c.textAlign = 'left';
-    c.fillText(`${Number(from.toPrecision(2))}`.replace('-', '−'), LEFT, height - 7);
+    // Where there isn't room for both, the unit goes first.
+    if (c.measureText(widest).width + c.measureText(least).width + 4 < width - RIGHT - LEFT) c.fillText(least, LEFT, height - 7);
   }
 }
 
@@ -133,8 +171,9 @@ export class Felt {
     this.points = freePoints(rows);
     this.drawFree(last.mass_kg);
     const touched = rows.filter((row) => row.contact !== 0).pop(), layer = this.objects[touched?.object]?.layer;
-    const { points, work } = touchPoints(rows, layer?.thickness);
+    const { points, work, last: lastTouch } = touchPoints(rows, layer?.thickness);
     this.touched = points;
+    this.cycle = cycleOf(lastTouch);
     this.drawTouch(points, layer?.stiffness);
     this.words.textContent = this.sentence(last.mass_kg, work);
   }
@@ -153,6 +192,10 @@ export class Felt {
     if (Number.isFinite(work) && Math.abs(work) > 1e-3) {
       parts.push(`the last touch ${work > 0 ? 'took' : 'gave'} ${Math.abs(work).toPrecision(2)} mJ along its normal`);
     }
+    if (this.cycle) {
+      const energy = this.cycle.energy_mJ;
+      parts.push(`a cycle of it ${energy >= 0 ? 'takes' : 'gives'} ${Number(Math.abs(energy).toPrecision(2))} mJ`);
+    }
     return parts.join('; ');
   }
 
@@ -168,9 +211,10 @@ export class Felt {
   drawTouch(points, layer_N_per_m) {
     const most = highest(points, 1, 1), rigid = !(layer_N_per_m > 0), k = rigid ? RIGID_N_PER_MM : 1e-3 * layer_N_per_m;
     const wide = Math.max(highest(points, 0, 0.01), (rigid ? 1.2 : 1) * (most / k)), from = -0.15 * wide;
+    const loop = this.cycle?.loop ?? [];
     this.touch.draw('N, by depth', 'mm', points, rigid
-      ? { wide, most, from, line: [[0, 0], [0, most]], ground: [[from, 0], [from, most], [most / k, most], [0, 0]] }
-      : { wide, most, from, line: [[0, 0], [wide, k * wide]],
+      ? { loop, wide, most, from, line: [[0, 0], [0, most]], ground: [[from, 0], [from, most], [most / k, most], [0, 0]] }
+      : { loop, wide, most, from, line: [[0, 0], [wide, k * wide]],
           ground: [[0, 0], [wide, (1 + NOTICEABLE) * k * wide], [wide, (1 - NOTICEABLE) * k * wide]] });
   }
 }

@@ -7,6 +7,7 @@ import { Microscope } from './microscope.js';
 import { Panel } from './panel.js';
 import { Player } from './player.js';
 import { Plots } from './plots.js';
+import { Spectrum } from './spectrum.js';
 import { toggleTheme } from './theme.js';
 import { World } from './world.js';
 
@@ -17,7 +18,7 @@ const plots = new Plots(element('plots'));
 const panel = new Panel();
 const microscope = new Microscope(element('microscope'));
 const keys = new Keys();
-let stage = null, built = false, newest = null, control = null, player = null, felt = null;
+let stage = null, built = false, newest = null, control = null, player = null, felt = null, spectrum = null;
 
 const connection = new Connection({
   stage: (value) => {
@@ -26,6 +27,7 @@ const connection = new Connection({
     panel.introduce(stage);
     plots.introduce(stage);
     felt = new Felt(element('felt'), stage);
+    spectrum = new Spectrum(element('vibration'), stage);
     document.body.dataset.mode = stage.mode;
     const chip = element('mode-chip');
     chip.hidden = false;
@@ -46,6 +48,7 @@ const connection = new Connection({
   settings: (settings) => control?.follow(settings),
   history: (rows) => (player ? player.takeHistory(rows) : rows.forEach((row) => plots.add(row))),
   frames: (frames) => player?.showFrames(frames),
+  spectrum: (bands) => spectrum?.show(bands),
   moment: (moment) => {
     // What acted in a moment that is overtaken is told with the next one.
     if (newest && !player) moment.flags_since = (moment.flags_since | newest.flags_since) >>> 0;
@@ -65,6 +68,7 @@ function frame(now) {
     if (!built) {
       built = true;
       world.build(stage, newest);
+      if (player) world.margins.setWay(player.overview); else for (const row of plots.rows) world.margins.show(row);
     }
     world.show(newest);
     panel.show(newest);
@@ -115,4 +119,4 @@ keys.add('=', '', () => world.zoom(CLOSER));
 keys.add('-', 'further away', () => world.zoom(1 / CLOSER), '−');
 
 // For tests and for the curious.
-globalThis.proxarm = { world, plots, panel, microscope, get felt() { return felt; }, connection, get control() { return control; }, get stage() { return stage; }, get player() { return player; } };
+globalThis.proxarm = { world, plots, panel, microscope, get felt() { return felt; }, get spectrum() { return spectrum; }, connection, get control() { return control; }, get stage() { return stage; }, get player() { return player; } };

@@ -1,6 +1,7 @@
-// The touch, enlarged until what is too small for the picture is seen: how far the tool, and in a simulation's record its
+// The touch, enlarged until what is too small for the picture is seen: how far the tool, and of a simulation its
 // steel, are from where the proxy presses. A section through the strongest contact, along its normal and along the way on
-// which the tool is aside.
+// which the tool is aside. Where the tool can go less than a millimetre along the normal, as in a hole, the other side is
+// drawn as well; before anything is touched the section is the one through what is nearest.
 import { colour, dash, onTheme } from './theme.js';
 import { vector } from './connection.js';
 
@@ -8,6 +9,8 @@ const LEAST_M = 1e-6, MOST_M = 1e-2;  // of the scale bar
 const BAR_PX = 64;                    // at least so long, at most 2.5 times
 const STEPS = [1, 2, 5];
 const FONT = '11px system-ui, "DejaVu Sans", sans-serif';
+const MOST_TIMES = 20;                // the other side, of what else is in the picture
+const BORDER = 12;                     // what is too far aside stands so far from it
 const MARGIN = 30;                    // between what is furthest away and the border
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -40,6 +43,22 @@ export function sectionOf(touch) {
   return section;
 }
 
+// While nothing presses: the whole tool beside the proxy, which is `room_below_m` from what is nearest.
+export function nearestTouch(moment) {
+  if (!Number.isFinite(moment.room_below_m)) return null;
+  const proxy = vector(moment, 'proxy'), steel = vector(moment, 'steel'), known = steel.some((x) => x !== 0);
+  const touch = { slips: false, gap_m: moment.room_below_m };
+  ['x', 'y', 'z'].forEach((axis, i) => {
+    touch[`normal_${axis}`] = moment[`room_${axis}`];
+    touch[`tool_${axis}`] = moment[`tool_${axis}`] - proxy[i];
+    touch[`steel_${axis}`] = known ? steel[i] - proxy[i] : NaN;
+  });
+  return touch;
+}
+
+// The other side above the surface that is touched, in metres; infinite where there is none.
+export const otherSide = (moment) => (Number.isFinite(moment.room_above_m) ? moment.room_above_m + Math.max(0, moment.room_below_m) : Infinity);
+
 export class Microscope {
   constructor(box) {
     this.box = box;
@@ -56,15 +75,17 @@ export class Microscope {
     return this.wanted;
   }
 
-  // Hidden where nothing is touched.
+  // Hidden where nothing is touched, nor within a millimetre.
   show(moment) {
     this.moment = moment;
     const strongest = moment?.contact ? moment.touches.reduce((most, touch) =>
       (!most || Math.hypot(...vector(touch, 'force')) > Math.hypot(...vector(most, 'force')) ? touch : most), null) : null;
-    this.box.hidden = !this.wanted || !strongest;
+    const touch = strongest ?? (moment ? nearestTouch(moment) : null);
+    this.box.hidden = !this.wanted || !touch;
     if (this.box.hidden) return;
-    this.section = sectionOf(strongest);
-    this.draw(strongest.slips);
+    this.section = { ...sectionOf(touch), other: otherSide(moment) };
+    this.touched = Boolean(strongest);
+    this.draw(touch.slips);
   }
 
   fit() {
@@ -78,9 +99,13 @@ export class Microscope {
   // The longest bar of the table with which everything is within the picture, kept while it fits well enough.
   scale(room) {
     const places = ['proxy', 'tool', 'steel'].filter((name) => this.section[name]).map((name) => this.section[name]);
-    const far = Math.max(LEAST_M / 20, ...places.map(([x, y]) => Math.max(Math.abs(x) / 1.3, Math.abs(y))));
+    const { other } = this.section, up = Math.max(LEAST_M / 20, ...places.map(([, y]) => Math.abs(y)));
+    // The other side is seen unless all else would become too small for that; its number stands there anyway. What is
+    // further aside than there is room stands at the border then.
+    const fit = other < MOST_TIMES * up || other < MOST_TIMES * LEAST_M;
+    const far = fit ? Math.max(up, other) : Math.max(up, ...places.map(([x]) => Math.abs(x) / 1.3));
     const fits = (bar) => (far / bar) * BAR_PX <= room;
-    const keeps = fits(this.bar_m) && (far / this.bar_m) * BAR_PX > 0.12 * room;
+    const keeps = fits(this.bar_m) && (far / this.bar_m) * BAR_PX > 0.2 * room;
     if (!keeps) this.bar_m = BARS.find(fits) ?? MOST_M;
     return BAR_PX / this.bar_m;
   }
@@ -90,8 +115,10 @@ export class Microscope {
     if (!width) return;
     c.clearRect(0, 0, width, height);
     const x0 = width / 2, y0 = height * 0.46, scale = this.scale(height * 0.46 - MARGIN);
-    this.drawSolid(width, height, y0);
-    const at = ([aside, up]) => [x0 + scale * aside, y0 - scale * up];
+    this.drawSolid(width, y0, height, 1);
+    const above = y0 - scale * this.section.other;
+    if (above > 0) this.drawSolid(width, above, 0, -1);
+    const at = ([aside, up]) => [Math.min(width - BORDER, Math.max(BORDER, x0 + scale * aside)), y0 - scale * up];
     const { proxy, tool, steel } = this.section;
     this.leash(at(proxy), at(tool));
     this.ring(at(proxy), 5, colour(slips ? '--slip' : '--stick'), true);
@@ -100,12 +127,12 @@ export class Microscope {
     this.texts(width, height, scale);
   }
 
-  // The solid's side of the surface, hatched.
-  drawSolid(width, height, y0) {
+  // The solid's side of a surface at `y0`, hatched, as far as `end`; `side`: 1 below, −1 above.
+  drawSolid(width, y0, end, side) {
     const c = this.context;
     c.fillStyle = colour('--solid');
     c.globalAlpha = 0.28;
-    c.fillRect(0, y0, width, height - y0);
+    c.fillRect(0, Math.min(y0, end), width, Math.abs(end - y0));
     c.globalAlpha = 1;
     c.strokeStyle = colour('--solid-edge');
     c.lineWidth = 1.5;
@@ -114,7 +141,7 @@ export class Microscope {
     c.lineTo(width, y0);
     for (let x = 6; x < width; x += 12) {
       c.moveTo(x, y0);
-      c.lineTo(x - 6, y0 + 6);
+      c.lineTo(x - 6, y0 + 6 * side);
     }
     c.stroke();
   }
@@ -153,15 +180,21 @@ export class Microscope {
   }
 
   texts(width, height, scale) {
-    const c = this.context, { tool, steel } = this.section;
+    const c = this.context, { tool, steel, other } = this.section;
     const narrow = width < 200;
     c.font = narrow ? FONT.replace('11', '10') : FONT;
     c.fillStyle = colour('--ink');
     c.textBaseline = 'alphabetic';
     c.textAlign = 'left';
     const place = ([aside, up]) => `${length(up)} ${up < 0 ? (narrow ? 'in' : 'inside') : 'away'}, ${length(aside)} aside`;
-    c.fillText(`○ tool ${place(tool)}`, 8, height - (steel ? 22 : 8));
-    if (steel) c.fillText(`× steel ${place(steel)}`, 8, height - 8);
+    const lines = [`○ tool ${place(tool)}`];
+    if (steel) lines.push(`× steel ${place(steel)}`);
+    const fit = other < LEAST_M / 20 ? 'none' : length(other);
+    if (Number.isFinite(other)) lines.unshift(narrow ? `room ${fit}` : `room to the other side: ${fit}`);
+    // A phone's picture is narrow.
+    const widest = Math.max(...lines.map((line) => c.measureText(line).width));
+    if (widest > width - 12) c.font = c.font.replace(/[\d.]+px/, `${(((narrow ? 10 : 11) * (width - 12)) / widest).toFixed(1)}px`);
+    lines.forEach((line, i) => c.fillText(line, 8, height - 8 - 14 * (lines.length - 1 - i)));
     const bar = scale * this.bar_m, right = width - 10;
     c.strokeStyle = colour('--ink');
     c.lineWidth = 2;

@@ -1,5 +1,6 @@
 // What the session is doing, in words and figures.
 import { vector } from './connection.js';
+import { addMargin, marginAt, overSmallest, setMargins } from './margins.js';
 
 const MOMENTARY_MS = 700;  // for how long a limit that acted is still told while time runs: shorter can't be read
 const JUMP_S = 0.3;        // between two moments of a record that don't follow each other
@@ -38,21 +39,10 @@ const SESSION_FIGURES = [
   ['tool to proxy', (m) => length(Math.hypot(m.tool_x - m.proxy_x, m.tool_y - m.proxy_y, m.tool_z - m.proxy_z))],
   ['mass felt, wanted', (m) => (m.mass_kg > 0 ? `${m.mass_kg.toFixed(2)} kg` : '—')],
   ['inertia felt', (m) => `${m.inertia_kg_m2.toPrecision(3)} kg m²`, turns],
-  ['smallest stable', (m) => overSmallest(marginAt(m)), (m) => Boolean(marginAt(m)) && m.mass_kg > 0],
+  ['smallest stable', (m) => overSmallest(marginAt(m.time_s)), (m) => Boolean(marginAt(m.time_s)) && m.mass_kg > 0],
   ['damping', (m) => `${m.damping_Ns_per_m.toFixed(1)} Ns/m`],
   ['timestep', (m) => `${(1e3 * m.period_s).toFixed(2)} ms`],
 ];
-
-// How far from swinging: what is felt over the smallest mass that is stable where the arm last came by a new place, as the
-// session judges it. Live it comes with the status, of a record with the stage.
-let margins = [];
-const marginAt = (moment) => margins.filter((margin) => margin.time_s <= moment.time_s + 1e-9).pop();
-export function overSmallest(margin) {
-  const { felt_mass_kg: felt, smallest_stable_mass_kg: smallest } = margin;
-  if (smallest === null) return '! none is stable';
-  const ratio = felt / smallest;
-  return `${ratio < 1 ? '! ' : ''}${smallest.toPrecision(2)} kg (${ratio.toFixed(2)} ×)`;
-}
 
 // Of the simulated arm alone.
 const ARM_FIGURES = [
@@ -90,7 +80,7 @@ export class Panel {
 
   introduce(stage) {
     this.stage = stage;
-    margins = stage.record?.margins ?? [];
+    setMargins(stage.record?.margins ?? []);
     this.figures = stage.mode === 'arm' ? ARM_FIGURES : SESSION_FIGURES;
     element('figures').replaceChildren();
     this.cells = this.figures.map(([label]) => {
@@ -110,8 +100,7 @@ export class Panel {
   }
 
   status(status) {
-    const { margin } = status, last = margins[margins.length - 1];
-    if (margin && last?.time_s !== margin.time_s) margins.push(margin);
+    if (status.margin) addMargin(status.margin);
     element('fault').hidden = !status.fault;
     element('fault').textContent = status.fault;
     element('phase-chip').dataset.fault = String(Boolean(status.fault));

@@ -4,6 +4,7 @@ import { colour, onTheme } from './theme.js';
 const element = (id) => document.getElementById(id);
 const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
 const PLOT_WINDOW_S = 6;
+const SPECTRUM_MS = 250;      // so often the handle's vibration is asked for while it plays
 const FRAMES_AFTER_MS = 120;  // once the place rests for so long, the frames of the buses are fetched
 
 function button(label, title, action) {
@@ -130,6 +131,11 @@ export class Player {
     if (index !== this.listed && now - this.moved > FRAMES_AFTER_MS) {
       this.listed = index;
       this.connection.want({ frames: index });
+    }
+    if (index !== this.heard && (now - this.heardAt > SPECTRUM_MS || this.heardAt === undefined)) {
+      this.heard = index;
+      this.heardAt = now;
+      this.connection.want({ spectrum: index });
     }
     if (this.stale) this.draw();
   }

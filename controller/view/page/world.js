@@ -4,6 +4,7 @@ import { OrbitControls } from './three/examples/jsm/controls/OrbitControls.js';
 import { ArmView } from './arm.js';
 import { ContactView } from './contacts.js';
 import { LimitsView } from './limits.js';
+import { MarginTrace } from './margins.js';
 import { SceneView } from './objects.js';
 import { vector } from './connection.js';
 import { colour, onTheme } from './theme.js';
@@ -88,7 +89,7 @@ export class World {
 
   // The first moment says where the tool is: planes are drawn about it.
   build(stage, moment) {
-    for (const part of [this.arm, this.objects, this.contacts, this.limits]) if (part) this.scene.remove(part);
+    for (const part of [this.arm, this.objects, this.contacts, this.limits, this.margins]) if (part) this.scene.remove(part);
     this.tool.set(...vector(moment, 'tool'));
     this.middle.copy(this.tool).multiplyScalar(0.62);
     this.middle.z = Math.max(0.2, this.tool.z * 0.95);
@@ -96,7 +97,8 @@ export class World {
     this.objects = new SceneView(stage, this.tool.clone());
     this.contacts = new ContactView(stage.mode !== 'arm');
     this.limits = new LimitsView(stage);
-    this.scene.add(this.arm, this.objects, this.limits, this.contacts);
+    this.margins = new MarginTrace(document.getElementById('margin-legend'));
+    this.scene.add(this.arm, this.objects, this.limits, this.contacts, this.margins);
     this.resize();
     for (const part of this.objects.parts) part.addEventListener('loaded', () => { this.changed = true; });
     this.look('overview');
@@ -159,6 +161,7 @@ export class World {
     this.objects.show(moment);
     this.contacts.show(moment);
     this.limits.show(moment);
+    this.margins.show(moment);
     this.moment = moment;
     this.changed = true;
   }

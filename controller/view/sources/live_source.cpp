@@ -5,7 +5,7 @@
 namespace proxarm::view {
 
 namespace {
-constexpr double history_s = 20.0;
+constexpr double history_s = 20.0, between_rooms_s = 0.1;
 constexpr std::size_t most_rows = 1300;  // a little more than 20 s at 60 per second
 }  // namespace
 
@@ -13,18 +13,25 @@ LiveSource::LiveSource(int descriptor, Stage& stage)
     : box_(descriptor), stage_(stage), builder_(stage.handle_mass_kg()), settings_(stage) {}
 
 bool LiveSource::advance() {
-  const std::uint64_t end = box_.cycles();
+  // The truth comes just after its cycle.
+  const std::uint64_t told = box_.truths(), end = told > 0 ? told : box_.cycles();
   if (next_ >= end) return false;
   if (const std::uint64_t oldest = box_.oldest_cycle(); next_ < oldest) next_ = oldest;
   bool any = false;
   for (; next_ < end; ++next_) {
     if (!box_.read(next_, cycle_)) continue;
-    const controller::CycleRecord& record = cycle_.record;
+    controller::CycleRecord& record = cycle_.record;
+    if (controller::BoxTruth truth; box_.truth(next_, truth)) {
+      record.set(controller::RecordFlag::truth);
+      record.true_tool_W_m = truth.tool_m;
+      record.true_tool_q_W = truth.tool_q;
+    }
     const bool rendered = record.phase == controller::Phase::rendering;
     const double period_s = 1e-9 * static_cast<double>(record.period_ns);
     stage_.follow(cycle_.change, rendered, period_s);
     settings_changed_ = settings_.follow(cycle_.change, period_s) || settings_changed_;
     builder_.add(record, 1e-9 * static_cast<double>(cycle_.rendered_ns));
+    spectrum_.add(record);
     any = true;
   }
   return any;
@@ -41,6 +48,12 @@ std::string LiveSource::encode(const Moment& moment) {
   stage_.place(moment.record, moment.rendered_s, links_, objects_);
   Moment turned = moment;
   turned.tool_q = models::Quaternion(stage_.tool_pose(links_).linear());
+  // As often as the panel's figures change: distances of a tool among meshes take their time.
+  if (const double now_s = 1e-9 * static_cast<double>(moment.record.time_ns); now_s >= next_room_s_) {
+    next_room_s_ = now_s + between_rooms_s;
+    room_ = stage_.room(moment.record, moment.rendered_s);
+  }
+  turned.room = room_;
   return encode_moment(turned, links_, objects_);
 }
 

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "controller/record/black_box.hpp"
+#include "controller/signals/handle_spectrum.hpp"
 #include "controller/view/stage/present_settings.hpp"
 #include "controller/view/stage/stage.hpp"
 
@@ -17,7 +19,8 @@ class LiveSource {
   // Precondition: `stage` outlives this object. Throws std::runtime_error if the descriptor isn't that of a black box.
   LiveSource(int descriptor, Stage& stage);
 
-  // Reads all cycles that have been added since the last call. Returns false if there was none.
+  // Reads all cycles that have been added since the last call, of a simulation those whose truth is told. Returns false
+  // if there was none.
   bool advance();
   // The moment that these cycles make up. Precondition: advance() has returned true since the last call.
   Moment take();
@@ -27,6 +30,9 @@ class LiveSource {
   // The session's settings after all cycles that were read. The second function returns true once after each change.
   [[nodiscard]] const PresentSettings& settings() const noexcept { return settings_; }
   bool have_settings_changed() noexcept { return std::exchange(settings_changed_, false); }
+
+  // How the handle vibrated in the last second; empty before that. By the truth where a simulation tells it.
+  [[nodiscard]] std::vector<controller::HandleSpectrum::Band> spectrum() const { return spectrum_.bands(); }
 
   // The fields of the last 20 s of moments, one after the other, for pages that connect later.
   [[nodiscard]] const std::vector<double>& history() const noexcept { return history_; }
@@ -41,7 +47,10 @@ class LiveSource {
   bool settings_changed_ = false;
   std::uint64_t next_ = 0;
   controller::BoxCycle cycle_;
+  controller::HandleSpectrum spectrum_;
   std::vector<models::Pose> links_, objects_;
+  std::optional<Room> room_;
+  double next_room_s_ = 0.0;  // when it is computed again
   std::vector<double> history_;
 };
 

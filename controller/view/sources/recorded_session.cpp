@@ -38,6 +38,9 @@ std::uint32_t holding_back() {
   return bits;
 }
 
+// Only a simulation's record has where the tool truly was.
+bool is_true(const CycleRecord& record) { return controller::vec3(record.true_tool_W_m).norm() > 0.0; }
+
 std::string words_of(std::uint32_t flags) {
   std::string text;
   for (const FlagWords& flag : flag_words()) {
@@ -169,6 +172,26 @@ Moment RecordedSession::moment(std::size_t index) const {
   return moment;
 }
 
+std::vector<controller::HandleSpectrum::Band> RecordedSession::spectrum(std::size_t index) const {
+  constexpr std::int64_t window_ns = 1'000'000'000;
+  static_assert(controller::HandleSpectrum::window_s == 1.0);
+  controller::HandleSpectrum spectrum;
+  std::size_t first = index;
+  // Two cycles more: of places it takes second differences.
+  while (first > 0 && time_ns_[index] - time_ns_[first] < window_ns + 2 * (time_ns_[first] - time_ns_[first - 1])) {
+    --first;
+  }
+  for (std::size_t i = first; i <= index; ++i) {
+    controller::CycleRecord record = signals_.row(i);
+    record.period_ns = i > 0 ? time_ns_[i] - time_ns_[i - 1] : 0;
+    record.set(controller::RecordFlag::truth, is_true(record));
+    spectrum.add(record);
+  }
+  return spectrum.bands();
+}
+
+bool RecordedSession::has_truth(std::size_t index) const { return is_true(signals_.row(index)); }
+
 // Of the touch that a cycle belongs to, or of one that ended within the last second.
 Blow RecordedSession::blow_before(std::size_t index) const {
   constexpr std::size_t most = 1000;
@@ -198,6 +221,7 @@ std::string RecordedSession::encode(std::size_t index) const {
   }
   stage_.place(shown.record, shown.rendered_s, links, objects, driven);
   shown.tool_q = models::Quaternion(stage_.tool_pose(links).linear());
+  shown.room = stage_.room(shown.record, shown.rendered_s);
   return encode_moment(shown, links, objects);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/record/replay_log.hpp"
+#include "controller/signals/handle_spectrum.hpp"
 #include "controller/view/sources/contacts_file.hpp"
 #include "controller/view/sources/signals_file.hpp"
 #include "controller/view/stage/stage.hpp"
@@ -43,6 +44,10 @@ class RecordedSession {
   [[nodiscard]] Moment moment(std::size_t index) const;
   // This moment as a message of the wire.
   [[nodiscard]] std::string encode(std::size_t index) const;
+  // How the handle vibrated in the second that ends with this cycle; empty where there is no such second.
+  [[nodiscard]] std::vector<controller::HandleSpectrum::Band> spectrum(std::size_t index) const;
+  // Whether the record has where the tool truly was.
+  [[nodiscard]] bool has_truth(std::size_t index) const;
   // The fields of at most `rows` moments between two cycles, with the peaks between them.
   [[nodiscard]] std::vector<double> window(std::size_t from, std::size_t to, std::size_t rows) const;
   // The frames on the buses in that cycle; empty if the record's replay doesn't contain it.

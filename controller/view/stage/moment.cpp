@@ -18,6 +18,8 @@ struct Field {
   double (*value)(const Moment&);
 };
 
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
 double norm(const Triple& v) noexcept { return controller::vec3(v).norm(); }
 
 constexpr std::array fields{
@@ -54,6 +56,11 @@ constexpr std::array fields{
     Field{"contact_peak_N", [](const Moment& m) { return m.contact_peak_N; }},
     Field{"blow_Ns", [](const Moment& m) { return m.blow.impulse_Ns(); }},
     Field{"blow_s", [](const Moment& m) { return m.blow.begun_s(); }},
+    Field{"room_below_m", [](const Moment& m) { return m.room ? m.room->below_m : unknown; }},
+    Field{"room_above_m", [](const Moment& m) { return m.room ? m.room->above_m : unknown; }},
+    Field{"room_x", [](const Moment& m) { return m.room ? m.room->normal_W.x() : unknown; }},
+    Field{"room_y", [](const Moment& m) { return m.room ? m.room->normal_W.y() : unknown; }},
+    Field{"room_z", [](const Moment& m) { return m.room ? m.room->normal_W.z() : unknown; }},
 };
 
 // A vector: one name, three numbers.
@@ -67,7 +74,8 @@ constexpr std::array vectors{VectorField{"force", &CycleRecord::force_W_N},
                              VectorField{"proxy", &CycleRecord::proxy_W_m},
                              VectorField{"contact_force", &CycleRecord::contact_force_W_N},
                              VectorField{"contact_torque", &CycleRecord::contact_torque_W_Nm},
-                             VectorField{"tool", &CycleRecord::tool_W_m}};
+                             VectorField{"tool", &CycleRecord::tool_W_m},
+                             VectorField{"steel", &CycleRecord::true_tool_W_m}};  // zero: nobody knows it
 
 template <typename Number>
 void append(std::string& bytes, std::span<const Number> numbers) {
@@ -167,7 +175,7 @@ void append_contacts(std::vector<double>& row, const Moment& moment) {
     }
     const Vec3 point = controller::vec3(contact.point_W_m);
     const Vec3 by_encoders = moved_with(record, point, controller::vec3(record.tool_W_m), moment.tool_q);
-    Vec3 truly = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+    Vec3 truly = Vec3::Constant(unknown);
     if (is_known) truly = moved_with(record, point, steel, models::Quaternion(record.true_tool_q_W.data()));
     for (const Vec3& vector : {by_encoders, truly}) row.insert(row.end(), vector.begin(), vector.end());
   }

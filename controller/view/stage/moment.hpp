@@ -11,6 +11,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,6 +25,15 @@ namespace proxarm::view {
 
 inline constexpr double kind_moment = 1.0, kind_history = 2.0;
 
+// How far the tool could go from the proxy's pose without turning, along the normal of the strongest contact; while
+// nothing is touched, along the way out of what is nearest.
+struct Room {
+  models::Vec3 normal_W = models::Vec3::Zero();
+  double below_m = 0.0;  // to what is touched
+  double above_m = 0.0;  // to the other side, as of a hole; infinite: none within most_m
+  static constexpr double most_m = 1e-3;
+};
+
 // What a page is shown of one cycle, and of the cycles before it that it wasn't shown.
 struct Moment {
   controller::CycleRecord record;
@@ -35,6 +45,7 @@ struct Moment {
   double contact_peak_N = 0.0;    // the world's largest force
   std::uint64_t overruns = 0;     // since the session began
   Blow blow;                      // of the last touch
+  std::optional<Room> room;       // none: nothing is within Room::most_m
   models::Quaternion tool_q = models::Quaternion::Identity();  // of the tool in W, by the encoders
 };
 

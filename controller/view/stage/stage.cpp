@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "controller/signals/clearances.hpp"
 #include "controller/view/stage/mesh_picture.hpp"
@@ -59,6 +60,67 @@ void Stage::complete(CycleRecord& record, double rendered_s) const {
   const std::int64_t rendered_ns = std::llround(1e9 * rendered_s);
   if (rigid_) return controller::add_clearances(record, *rigid_, rendered_ns);
   controller::add_clearances(record, scene_, clearances_, rendered_ns);
+}
+
+namespace {
+
+// Out of the strongest contact; zero if nothing presses.
+Vec3 strongest_normal(const CycleRecord& record) {
+  double most_N = 0.0;
+  Vec3 normal = Vec3::Zero();
+  for (std::size_t i = 0; i < record.recorded_contacts(); ++i) {
+    const double force_N = controller::vec3(record.contacts[i].force_W_N).norm();
+    if (force_N <= most_N) continue;
+    most_N = force_N;
+    normal = controller::vec3(record.contacts[i].normal_W);
+  }
+  return normal;
+}
+
+// How far along `normal` until something is deeper inside of an object than it was at first, up to Room::most_m.
+template <typename Gap>
+double way_to_other_side(const Gap& gap_m, const Vec3& normal) {
+  constexpr double first_m = 1e-6, tolerance_m = 1e-7;  // of what else is touched beside
+  constexpr int halvings = 16;
+  const double begun_m = std::min(0.0, gap_m(Vec3::Zero()));
+  const auto blocked = [&](double t) { return gap_m(t * normal) < begun_m - tolerance_m; };
+  double free_m = 0.0, there_m = first_m;
+  while (!blocked(there_m)) {
+    free_m = there_m;
+    there_m *= 2.0;
+    if (free_m > Room::most_m) return std::numeric_limits<double>::infinity();
+  }
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = 0.5 * (free_m + there_m);
+    (blocked(middle) ? there_m : free_m) = middle;
+  }
+  return std::max(0.0, there_m - tolerance_m);
+}
+
+}  // namespace
+
+std::optional<Room> Stage::room(const CycleRecord& record, double rendered_s) const {
+  if (record.phase != controller::Phase::rendering || options_.arm_alone) return std::nullopt;
+  const Vec3 proxy = controller::vec3(record.proxy_W_m);
+  const models::Quaternion q(record.proxy_q_W.data());
+  const auto gap_m = [&](const Vec3& moved) {
+    return rigid_ ? rigid_->clearance_at_m({proxy + moved, q}, rendered_s)
+                  : clearances_.of_point(proxy + moved, rendered_s, scenes::Driven::left_out);
+  };
+  Room room{.normal_W = strongest_normal(record), .below_m = 0.0, .above_m = 0.0};
+  if (!(room.normal_W.squaredNorm() > 0.5)) {
+    room.below_m = gap_m(Vec3::Zero());
+    if (!(room.below_m < Room::most_m)) return std::nullopt;
+    constexpr double step_m = 1e-7;
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 step = step_m * Vec3::Unit(i);
+      room.normal_W[i] = (gap_m(step) - gap_m(-step)) / (2.0 * step_m);
+    }
+    if (!(room.normal_W.norm() > 0.1)) return std::nullopt;  // as far from both sides
+    room.normal_W.normalize();
+  }
+  room.above_m = way_to_other_side(gap_m, room.normal_W);
+  return room;
 }
 
 Pose Stage::tool_pose(std::span<const Pose> links) const noexcept {

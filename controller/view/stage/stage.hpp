@@ -5,6 +5,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -51,6 +52,8 @@ class Stage {
 
   // Adds the distances of proxy and tool, with the tool's shape where there is one: the cycle doesn't compute them.
   void complete(controller::CycleRecord& record, double rendered_s) const;
+  // The room about the proxy, by up to some forty distances of the tool: of meshes a millisecond or more.
+  [[nodiscard]] std::optional<Room> room(const controller::CycleRecord& record, double rendered_s) const;
   // A driven object's displacement from where the scene describes it, after all calls of follow().
   [[nodiscard]] models::Vec3 driven_m(std::size_t object) const noexcept {
     return changes_.position_m(static_cast<std::int32_t>(object));

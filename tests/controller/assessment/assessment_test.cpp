@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
+#include <string>
 
 #include "controller/assessment/assessment_report.hpp"
 #include "models/base/setup_error.hpp"
@@ -149,6 +151,45 @@ TEST(ThresholdsFile, TheShippedOneNamesItsSource) {
   EXPECT_EQ(thresholds.regions[0].stiffness_N_per_m, 75e3);
   EXPECT_EQ(thresholds.regions[0].transient_N, 280.0);
   EXPECT_EQ(thresholds.regions[0].quasi_static_N, 140.0);
+  ASSERT_TRUE(thresholds.vibration);
+  EXPECT_NE(thresholds.vibration->source.find("Brisben"), std::string::npos);
+  // Lowest between 150 and 200 Hz, as the paper's abstract has it.
+  const auto amplitude = [&](double f_Hz) { return thresholds.vibration->amplitude_m(f_Hz).value(); };
+  for (const double f_Hz : {10.0, 40.0, 125.0, 250.0, 400.0}) EXPECT_GT(amplitude(f_Hz), amplitude(175.0)) << f_Hz;
+  for (double f_Hz = 10.0; f_Hz < 150.0; f_Hz *= 1.1) EXPECT_GT(amplitude(f_Hz), amplitude(1.05 * f_Hz)) << f_Hz;
+}
+
+TEST(ThresholdsFile, BetweenTwoPointsOfAVibrationIsAPowerOfTheFrequency) {
+  const VibrationThreshold steep{"", {{10.0, 4e-6}, {40.0, 2.5e-7}, {100.0, 2.5e-7}}};
+  EXPECT_NEAR(steep.amplitude_m(20.0).value(), 1e-6, 1e-12);  // 12 dB an octave: a quarter at twice the frequency
+  EXPECT_EQ(steep.amplitude_m(10.0), 4e-6);
+  EXPECT_EQ(steep.amplitude_m(40.0), 2.5e-7);
+  EXPECT_NEAR(steep.amplitude_m(70.0).value(), 2.5e-7, 1e-15);
+  EXPECT_EQ(steep.amplitude_m(100.0), 2.5e-7);
+  EXPECT_FALSE(steep.amplitude_m(9.9));
+  EXPECT_FALSE(steep.amplitude_m(101.0));
+}
+
+TEST(ThresholdsFile, RefusesPointsOutOfOrder) {
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "thresholds.yaml";
+  const auto refused = [&](const std::string& points) -> std::string {
+    std::ofstream(file) << "source: a\nregions:\n"
+                           "  - {name: hand, stiffness_N_per_mm: 75, quasi_static_N: 140, transient_N: 280}\n"
+                           "vibration:\n  source: b\n  points: "
+                        << points << "\n";
+    try {
+      (void)load_thresholds(file);
+    } catch (const description::SetupError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refused("[{frequency_Hz: 10, amplitude_um: 3}, {frequency_Hz: 20, amplitude_um: 1}]"), "");
+  const std::string order = refused("[{frequency_Hz: 20, amplitude_um: 3}, {frequency_Hz: 10, amplitude_um: 1}]");
+  EXPECT_NE(order.find("sorted by frequency"), std::string::npos) << order;
+  EXPECT_NE(refused("[{frequency_Hz: 20, amplitude_um: 3}]").find("vibration.points"), std::string::npos);
+  EXPECT_NE(refused("[{frequency_Hz: 20, amplitude_um: 3}, {frequency_Hz: 30, amplitude_um: 0}]").find("amplitude_um"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -64,8 +64,10 @@ double difference(const std::string& a, const std::string& b, const Sight& sight
 const std::vector<std::vector<const char*>> together{{"proxy", "tool", "hand", "slip"},
                                                      {"stick", "slip", "hand", "soft", "ink"},
                                                      {"stick", "slip", "bad", "soft", "ink"},
-                                                     {"good", "hand", "ink"}};
-const std::vector<const char*> marks{"proxy", "tool", "hand", "stick", "slip", "good", "bad", "accent"};
+                                                     {"good", "hand", "ink"},
+                                                     {"margin-1", "margin-2", "margin-3", "margin-4"}};
+const std::vector<const char*> marks{"proxy", "tool",   "hand",     "stick",    "slip",     "good",
+                                     "bad",   "accent", "margin-1", "margin-2", "margin-3", "margin-4"};
 
 TEST(Palette, TextIsReadable) {  // WCAG 2.1, 1.4.3
   for (const bool dark : {false, true}) {
