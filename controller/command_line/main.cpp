@@ -165,6 +165,12 @@ void add_session_options(CLI::App& app, RunOptions& options) {
                  "send the arm to where the proxy is going to be, which makes up for the loop's delay: off (default), "
                  "auto, the horizon that is stable with margins for this mass, hand and cell, or a time, such as 8ms")
       ->type_name("auto|off|TIME");
+  app.add_option("--gear-damping",
+                 choice<bool>("--gear-damping", {{"auto", true}, {"off", false}},
+                              [&](bool value) { options.damps_gears = value; }),
+                 "auto (default): where drives measure the torque of their gears, damp the arm's elastic modes by it, "
+                 "as hard as is stable with margins; off: don't")
+      ->type_name("auto|off");
   app.add_option("--duration",
                  quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
                           [&](double value) { options.duration_s = value; }),
@@ -358,7 +364,7 @@ void add_assess_options(CLI::App& app, command_line::AssessOptions& options) {
 void add_prove_options(CLI::App& app, command_line::ProveOptions& options) {
   add_session_options(app, options.run);
   leave_out(app, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--scheme", "--duration",
-                  "--extra-delay", "--lookahead"});
+                  "--extra-delay", "--lookahead", "--gear-damping"});
   add_fault_option(app, options.run);
   add_enabling_option(app, options.run);
   add_without_enabling(app, options.run);
@@ -375,7 +381,7 @@ void add_prove_options(CLI::App& app, command_line::ProveOptions& options) {
 void add_identify_options(CLI::App& app, command_line::IdentifyOptions& options) {
   add_session_options(app, options.run);
   leave_out(app, {"--scene", "--mass", "--damping", "--spring", "--stiffness", "--scheme", "--duration",
-                  "--extra-delay", "--lookahead"});
+                  "--extra-delay", "--lookahead", "--gear-damping"});
   app.remove_option(app.get_option("--hand"));
   app.add_option("--hand", options.run.hand, "simulated arm only: file of a hand at the handle (default: nobody)")
       ->type_name("FILE");
@@ -411,7 +417,7 @@ std::vector<double> angles_of(const std::string& text) {
 void add_calibrate_options(CLI::App& app, command_line::CalibrateOptions& options) {
   add_session_options(app, options.run);
   leave_out(app, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--scheme", "--duration",
-                  "--extra-delay", "--lookahead", "--timestep"});
+                  "--extra-delay", "--lookahead", "--gear-damping", "--timestep"});
   add_fault_option(app, options.run);
   add_hardware_option(app, options.run);
   app.add_flag("--without-enabling-input", options.run.settings.without_enabling_input,
@@ -464,7 +470,7 @@ class Commands {
     CLI::App* sim =
         add("sim", "the simulated arm as a process of its own on CAN interfaces", [this] { return sim_command(sim_); });
     add_session_options(*sim, sim_);
-    leave_out(*sim, {"--lookahead"});
+    leave_out(*sim, {"--lookahead", "--gear-damping"});
     sim->add_flag("--for-proof", sim_.for_proof,
                   "for `proxarm prove` on these interfaces: in place of the hand, somebody who pushes as it asks");
     add_fault_option(*sim, sim_);
@@ -479,7 +485,7 @@ class Commands {
         add("plan", "bus budget of a cell; status 1 if it can't be carried", [this] { return plan_command(plan_); });
     add_session_options(*plan, plan_);
     leave_out(*plan, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--extra-delay",
-                      "--lookahead", "--duration"});
+                      "--lookahead", "--gear-damping", "--duration"});
     CLI::App* scan = add("scan", "what is on a CAN interface: listens, then asks; changes nothing",
                          [this] { return scan_command(scan_); });
     scan->add_option("--bus", scan_.interface, "CAN interface, such as can0")->required()->type_name("IFACE");
@@ -609,7 +615,7 @@ class Commands {
                          });
     add_session_options(*zero, zero_.run);
     leave_out(*zero, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--scheme", "--duration",
-                      "--extra-delay", "--lookahead"});
+                      "--extra-delay", "--lookahead", "--gear-damping"});
     add_fault_option(*zero, zero_.run);
     add_enabling_option(*zero, zero_.run);
     add_hardware_option(*zero, zero_.run);

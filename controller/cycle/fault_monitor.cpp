@@ -42,7 +42,7 @@ void FaultMonitor::judge_joints(const Measured& measured, Phase entered) noexcep
     const fieldbus::CyclicDrive& drive = drives_[static_cast<std::size_t>(i)].drive;
     if ((measured.fresh & 1u << i) == 0 || (entered == Phase::disabling && !has_power(drive.state()))) continue;
     const double T = settings_.period_s;
-    const double cycles = 1.0 + measured.unheard_cycles[i] + 2.0 * measured.feedback_period_s[i] / T;
+    const double cycles = 1.0 + measured.answers.unheard_cycles[i] + 2.0 * measured.answers.period_s[i] / T;
     const double most_rad = implausible_speeds * drive.description().max_speed_rad_per_s * T * cycles;
     const double jump_rad = std::abs(measured.jump_rad[i]);
     if (jump_rad > most_rad) {
@@ -63,7 +63,7 @@ void FaultMonitor::judge_following(const Measured& measured, Phase entered) noex
   const DriveReports now{.reported_rad = measured.motor_rad,
                          .link_rad = measured.link_rad,
                          .setpoint_rad = measured.drive_target_rad,
-                         .feedback_period_s = measured.feedback_period_s,
+                         .feedback_period_s = measured.answers.period_s,
                          .fresh = measured.fresh,
                          .following = following,
                          .braking = braking,

@@ -28,6 +28,7 @@ SummaryConfig summary_config(const command_line::PreparedSession& session) {
   }
   // What is looked ahead isn't behind.
   config.lookahead_s = session.settings.horizon_s;
+  config.gear_damping_per_s = session.settings.gear_damping_per_s;
   config.setpoint_filter_s =
       command_line::motion_delay_s(session) - 2.0 * session.settings.period_s - session.settings.horizon_s;
   const double behind_s = std::max(0.0, command_line::motion_delay_s(session) - session.settings.horizon_s);

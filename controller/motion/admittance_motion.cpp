@@ -102,6 +102,10 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
                                               {}});
     ahead_->proxy_filter.start(arm.start_rad());
   }
+  if (settings.gear_damping_per_s > 0.0) {
+    gear_damping_.emplace(arm, drives, GearDampingChoice{settings.gear_damping_per_s, settings.damped_gears},
+                          settings.period_s);
+  }
   if (settings.passivity != Passivity::off) {
     passivity_.emplace(
         PassivityConfig{.band = {.report_rate_Hz = settings.report_rate_Hz}, .force_age_s = settings.force_age_s},
@@ -120,6 +124,7 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   state_.q_k1_W = state_.q_k2_W = X_WT.translation();
   parts_.inverse.set_posture(arm_step_.link_rad());
   parts_.elastic.start(arm_step_.link_rad());
+  if (gear_damping_) gear_damping_->start();
   final_.start(target_rad);
   if (state_.freeing) parts_.release->tool().count_from(parts_.tool->sets().home);
   tool().start(state_.q_k1_W, orientation_of(X_WT));
@@ -141,6 +146,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   period_s_ = period_s;
   parts_.inverse.set_max_step(final_.max_steps_rad(period_s));
   parts_.elastic.set_period(period_s);
+  if (gear_damping_) gear_damping_->set_period(period_s);
   parts_.tool->set_period(period_s);
   parts_.release->set_period(period_s);
   if (passivity_) passivity_->set_period(period_s);
@@ -196,6 +202,7 @@ void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
   if (passivity_) passivity_->archive(state);
   if (parts_.links) parts_.links->archive(state);
   if (ahead_) state(ahead_->point, ahead_->proxy_step, ahead_->proxy_filter);
+  if (gear_damping_) gear_damping_->archive(state);
   state(parts_.elastic, hand_, arm_step_, final_, limits_work_, parts_.inverse.posture());
   archive_fields(state, state_);
 }
@@ -505,7 +512,11 @@ TurnSets AdmittanceMotion::turn_limits() const noexcept {
 void AdmittanceMotion::send(const Measured& measured) noexcept {
   const bool turns = tool().turns();
   const TurnSets turn = turns ? turn_limits() : TurnSets{};
-  const JointVector motor_rad = parts_.elastic.step(arm_step_.link_rad());
+  JointVector motor_rad = parts_.elastic.step(arm_step_.link_rad());
+  if (gear_damping_) {
+    const JointVector measured_Nm = measured.gear_torque_Nm + parts_.elastic.joint_torques_Nm(measured.hand_W);
+    motor_rad += gear_damping_->step(parts_.elastic.asked_Nm(), measured_Nm);
+  }
   const FinalSetpoints::Result result = final_.step(motor_rad, measured,
                                                     {.max_speed_m_per_s = state_.speed_limit_m_per_s,
                                                      .links_W = parts_.elastic.kinematics().X_WT.translation(),
@@ -521,6 +532,7 @@ void AdmittanceMotion::send(const Measured& measured) noexcept {
 void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   const JointVector speed = final_.go_on_from_here(blocked);
   parts_.elastic.resume(final_.target_rad(), speed);
+  if (gear_damping_) gear_damping_->start();
   const LinkFilter& filter = parts_.elastic.filter();
   arm_step_.resume(filter.rad() + filter.lead_s() * speed, period_s_ * speed);
   const models::ToolKinematics& at = arm_step_.kinematics();

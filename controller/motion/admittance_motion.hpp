@@ -27,6 +27,7 @@
 #include "controller/motion/hand_judge.hpp"
 #include "controller/motion/motion.hpp"
 #include "controller/rendering/session_settings.hpp"
+#include "controller/setpoints/gear_damping.hpp"
 #include "controller/setpoints/link_filter.hpp"
 #include "controller/stability/passivity.hpp"
 #include "models/base/archive_fields.hpp"
@@ -131,6 +132,7 @@ class AdmittanceMotion final : public Motion {
   StepLimiter limiter_;
   ArmStep arm_step_;  // of the arm as it is sent
   std::unique_ptr<Ahead> ahead_;
+  std::optional<GearDamping> gear_damping_;  // none: no gear's torque is measured, or none is to be damped
   FinalSetpoints final_;
   LimitsWork limits_work_;
   StepLimits step_limits_;  // of this cycle, around the proxy

@@ -104,8 +104,7 @@ std::uint8_t FinalSetpoints::find_blocked(const JointVector& motor_rad, const Me
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
     const auto bit = static_cast<std::uint8_t>(1u << i);
     if ((measured.fresh & bit) == 0) continue;
-    const double lag_s =
-        following_lag_s(drives_[static_cast<std::size_t>(i)], period_s_, measured.feedback_period_s[i]);
+    const double lag_s = following_lag_s(drives_[static_cast<std::size_t>(i)], period_s_, measured.answers.period_s[i]);
     const double room_rad = limits_.following_error_rad + lag_s / period_s_ * std::abs(measured.moved_rad[i]);
     const double actual_rad = measured.motor_rad[i];
     if (std::abs(motor_rad[i] - actual_rad) <= room_rad) continue;
@@ -126,7 +125,7 @@ void FinalSetpoints::follow(const Measured& measured, std::uint8_t blocked) noex
   for (Eigen::Index i = 0; i < measured.axes(); ++i) {
     if ((blocked & 1u << i) != 0) continue;
     envelope_.step(i, guard_.target_rad()[i], period_s_,
-                   following_lag_s(drives_[static_cast<std::size_t>(i)], period_s_, measured.feedback_period_s[i]));
+                   following_lag_s(drives_[static_cast<std::size_t>(i)], period_s_, measured.answers.period_s[i]));
   }
 }
 

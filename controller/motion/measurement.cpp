@@ -33,7 +33,7 @@ Measurement::Measurement(std::span<const DriveOnBus> drives, const fieldbus::For
   const JointVector zero = JointVector::Zero(arm.axes());
   Measured& now = state_.measured;
   now.motor_rad = now.link_rad = now.drive_target_rad = arm.start_rad();
-  now.moved_rad = now.jump_rad = now.unheard_cycles = now.feedback_period_s = zero;
+  now.moved_rad = now.jump_rad = now.answers.unheard_cycles = now.answers.period_s = now.gear_torque_Nm = zero;
   state_.stale_cycles = zero;
   points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer, and all are archived
   arm.points(now.link_rad, points_);
@@ -72,9 +72,10 @@ void Measurement::read_encoders() noexcept {
     now.jump_rad[i] = actual_rad - now.motor_rad[i];
     now.moved_rad[i] += share * (now.jump_rad[i] - now.moved_rad[i]);
     now.motor_rad[i] = actual_rad;
-    now.feedback_period_s[i] = drive.feedback_period_s();
+    now.answers.period_s[i] = drive.feedback_period_s();
     now.drive_target_rad[i] = drive.target_rad();
-    now.unheard_cycles[i] = state_.stale_cycles[i];
+    if (const auto torque_Nm = drive.gear_torque_Nm()) now.gear_torque_Nm[i] = *torque_Nm;
+    now.answers.unheard_cycles[i] = state_.stale_cycles[i];
     state_.stale_cycles[i] = drive.fresh() ? 0.0 : state_.stale_cycles[i] + 1.0;
     const auto bit = static_cast<std::uint8_t>(1u << i);
     if (drive.fresh()) now.fresh |= bit;

@@ -37,15 +37,21 @@ struct SensorBias {
   models::Vec3 beside_zero_S = models::Vec3::Zero();
 };
 
+// When drives answer.
+struct AnswerTimes {
+  models::JointVector unheard_cycles;  // cycles without an answer of each drive, up to this one
+  models::JointVector period_s;        // of each drive's answers; 0: in every cycle
+};
+
 // The measurements of one cycle. Joint vectors and bits of joints are in the order of the arm's joints.
 struct Measured {
   // By the encoders:
   models::JointVector motor_rad, link_rad;
-  models::JointVector moved_rad;          // change of the motors' angles per cycle, low-pass of the drives' answers
-  models::JointVector jump_rad;           // change of the motors' angles since the cycle before
-  models::JointVector unheard_cycles;     // cycles without an answer of the drive, up to this one
-  models::JointVector feedback_period_s;  // of each drive; 0: it answers in every cycle
+  models::JointVector moved_rad;  // change of the motors' angles per cycle, low-pass of the drives' answers
+  models::JointVector jump_rad;   // change of the motors' angles since the cycle before
+  AnswerTimes answers;
   models::JointVector drive_target_rad;   // each drive's last setpoint; its position if it takes none
+  models::JointVector gear_torque_Nm;     // of each gear on its link, where the drive measures it; 0 elsewhere
   std::uint8_t fresh = 0, following = 0;  // drives that have answered in this cycle, and drives that take setpoints
 
   models::Vec3 tool_W = models::Vec3::Zero();

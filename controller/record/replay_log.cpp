@@ -18,16 +18,16 @@ constexpr std::uint32_t most_frames_per_cycle = 16384;
 constexpr std::size_t most_entry_bytes = most_frames_per_cycle * 96 + 4096;
 constexpr std::size_t block_bytes = 1 << 18;
 constexpr std::size_t most_block_bytes = block_bytes + most_entry_bytes + sizeof(std::uint32_t);
-constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', '1', '2'};
+constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', '1', '3'};
 
 [[noreturn]] void cannot_write(const fs::path& file, const std::string& found) {
   throw SetupError({.file = file.string(), .found = found, .expected = "a file that can be written"});
 }
 
 void archive(fieldbus::StateArchive& state, SessionSettings& s) noexcept {
-  static_assert(sizeof(SessionSettings) == 232, "a new setting belongs into this list");
+  static_assert(sizeof(SessionSettings) == 240, "a new setting belongs into this list");
   state(s.scheme, s.coupling_stiffness_N_per_m, s.coupling_damping_Ns_per_m, s.period_s, s.receive_window, s.mass_kg,
-        s.damping_Ns_per_m, s.spring_N_per_m, s.order, s.looks_ahead, s.horizon_s, s.orientation, s.passivity,
+        s.damping_Ns_per_m, s.spring_N_per_m, s.order, s.looks_ahead, s.horizon_s, s.gear_damping_per_s, s.damped_gears, s.orientation, s.passivity,
         s.force_age_s, s.report_rate_Hz, s.rotational_inertia_kg_m2, s.rotational_damping_Nms_per_rad,
         s.rotational_spring_Nm_per_rad, s.tare_s, s.tare_spread_N, s.zero_S_N, s.zero_drift_N, s.only_tares,
         s.always_held, s.enable_timeout_s, s.enabling_timeout_s, s.wait_after_fault_s, s.without_enabling_input,

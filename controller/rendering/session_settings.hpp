@@ -39,6 +39,8 @@ struct SessionSettings {
   int order = 1;                  // 1: (26); 2: with weighted forces (force_weights.hpp)
   bool looks_ahead = false;       // the arm is sent to a predicted position of the proxy (lookahead.hpp)
   double horizon_s = 0.0;         // H, the lookahead's horizon
+  double gear_damping_per_s = 0.0;    // κ, of gears that are damped by their torque (gear_damping.hpp); 0: none is
+  std::uint8_t damped_gears = 0;      // a bit for each joint
   OrientationMode orientation = OrientationMode::held;
   Passivity passivity = Passivity::off;
   // For the passivity observer: the age of the sensor's readings on arrival, and how often the joint that reports its

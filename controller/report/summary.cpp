@@ -448,6 +448,7 @@ Summary SummaryBuilder::finish() {
   summary.setpoint_sha256 = s.hash.hex();
   summary.wanted_mass_kg = s.config.wanted_mass_kg;
   summary.lookahead_s = s.config.lookahead_s;
+  summary.gear_damping_per_s = s.config.gear_damping_per_s;
   return summary;
 }
 

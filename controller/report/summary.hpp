@@ -69,6 +69,7 @@ struct SummaryConfig {
   double settle_s = 0.5;                     // how long the arm may ring from it
   bool passivity = false;                    // observed
   double lookahead_s = 0.0;                  // horizon at the start, which the delays above are without
+  double gear_damping_per_s = 0.0;           // κ of gears whose torque is measured; 0: none is damped
   std::vector<std::string> axis_names = {};  // for limits of single joints
 };
 
@@ -193,6 +194,7 @@ struct Summary {
   std::optional<Swing> expected_swing;     // of a tool that is led and turned; set by the caller
   std::optional<PosesSummary> poses;       // set by the caller; absent: impedance type
   double lookahead_s = 0.0;                // horizon at the start; 0: none
+  double gear_damping_per_s = 0.0;         // 0: none
   double hands_off_s = 0.0;                // nobody held the handle
   std::uint64_t guarded_cycles = 0;        // in which the last guard held a setpoint back: none without a fault
   // What limits have put into the proxy, and the most without taking it back; negative: they took it.

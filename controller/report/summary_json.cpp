@@ -192,6 +192,7 @@ void add_repeatable(Json& json, const Summary& s) {
                               {"cycles", limit.cycles}});
   }
   json["lookahead_s"] = s.lookahead_s;
+  json["gear_damping_per_s"] = s.gear_damping_per_s;
   json["oscillation"] = oscillation(s.oscillation);
   json["expected_swing"] = nullptr;
   if (s.expected_swing) {

@@ -186,6 +186,8 @@ void tell_motion(const Summary& s, Lines& line) {
   line("apparent mass", apparent_mass(s) + drag(s.apparent_damping_Ns_per_m, "Ns/m", "%.2f ") +
                             (s.limited_cycles > 0 ? "; where no limit acts" : ""));
   tell_inertia(s, line);
+  if (s.gear_damping_per_s > 0.0)
+    line("gear damping", format("%.3g/s, by the gears' measured torque", s.gear_damping_per_s));
   if (s.lookahead_s > 0.0)
     line("lookahead", format("%.3g ms: the arm is sent to where the proxy will be", 1e3 * s.lookahead_s));
   tell_felt_mass(s, line);

@@ -28,7 +28,10 @@ class ElasticSetpoint {
   // Precondition: `arm` outlives this object.
   ElasticSetpoint(const models::Arm& arm, double bandwidth_Hz, double period_s);
 
-  void set_period(double period_s) noexcept { filter_.set_period(period_s); }
+  void set_period(double period_s) noexcept {
+    period_s_ = period_s;
+    filter_.set_period(period_s);
+  }
   // Starts at rest at these angles of the links.
   void start(const models::JointVector& link_rad) noexcept;
   // Goes on from the motors' angles and speeds, and discards what the filter had accumulated. The links are taken to be
@@ -36,6 +39,13 @@ class ElasticSetpoint {
   void resume(const models::JointVector& motor_rad, const models::JointVector& motor_rad_per_s) noexcept;
   // One period towards these angles of the links. Returns the motors' setpoints.
   models::JointVector step(const models::JointVector& link_rad) noexcept;
+
+  // What the last step asks of the gears, M(q_f) q̈_f + τ_g, by the mean of q̈_f over it. (At the step's end q̈_f is off
+  // by ω² q̇_f T/2, since the filter's input is held over the period: a motor is 0.1 ms early by that, which its gear
+  // doesn't carry.)
+  [[nodiscard]] models::JointVector asked_Nm() noexcept;
+  // Jᵀh of a wrench about T.
+  [[nodiscard]] models::JointVector joint_torques_Nm(const models::Wrench& wrench_W) const noexcept;
 
   // Its output is the links' angles and speeds as they are commanded now.
   [[nodiscard]] const LinkFilter& filter() const noexcept { return filter_; }
@@ -46,7 +56,9 @@ class ElasticSetpoint {
  private:
   const models::Arm* arm_;
   LinkFilter filter_;
-  models::ToolKinematics kinematics_;  // at the filter's output
+  double period_s_;
+  models::JointVector speed_before_rad_per_s_;  // of the filter, before the last step
+  models::ToolKinematics kinematics_;           // at the filter's output
 };
 
 }  // namespace proxarm::controller

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "controller/setpoints/gear_damping.hpp"
 #include "controller/stability/order2_polynomials.hpp"
 #include "controller/stability/stability.hpp"
 #include "models/arm/held_orientation.hpp"
@@ -21,7 +22,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using models::product;
 using models::transposed_product;
-using Place = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;  // in the tool's space
 
 // exp(A) by scaling and squaring: Taylor's series of A/2ˢ, whose norm is below 1/2 so that 18 terms leave 1e-22,
 // squared s times.
@@ -57,6 +57,16 @@ ProxyPolynomial proxy_polynomial(int order) {
   return A;
 }
 
+// An age in periods, between two of which what is read lies on a straight line. A quotient of decimal numbers, hence
+// the 1e-9.
+struct Age {
+  explicit Age(double periods)
+      : whole(static_cast<Index>(std::floor(periods + 1e-9))),
+        rest(std::max(0.0, periods - static_cast<double>(whole))) {}
+  Index whole;
+  double rest;
+};
+
 // The damping ratio of the arm's first mode, and the frequency that a rigid gear is given: far above all others here.
 constexpr double ringing = 0.03, rigid_Hz = 300.0;
 
@@ -79,6 +89,14 @@ void add_drives(const description::Cell& cell, ElasticArm& arm) {
   if (yields < least) return;
   arm.rotor_kg_m2 = rotor;
   arm.drive_rad_per_s = omega;
+}
+
+double torque_delay_s(const description::Cell& cell) {
+  double delay_s = 0.0;
+  for (const description::DriveDescription& drive : cell.drives) {
+    if (drive.gear_torque) delay_s = std::max(delay_s, drive.gear_torque->delay_s);
+  }
+  return delay_s;
 }
 }  // namespace
 
@@ -108,6 +126,7 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
     d = cell.drives[static_cast<std::size_t>(i)].gear_damping_Nms_per_rad.value_or(2.0 * ringing * k / first);
   }
   add_drives(cell, out);
+  out.torque_delay_s = torque_delay_s(cell);
   return out;
 }
 
@@ -212,7 +231,7 @@ std::vector<models::JointVector> led_poses(const models::Arm& arm, const std::ve
 // The indices of the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, proxies, the
 // filter's x_f and ẋ_f, the forces that were read, and the drives' [δ, δ̇, ∫δ] and [θ̇, f].
 struct ElasticLoop::State {
-  Index n, d, ages, kept, drives, forward;
+  Index n, d, ages, kept, drives, forward, torques, models;
   [[nodiscard]] Index plant() const { return 0; }
   [[nodiscard]] Index sent() const { return 3 * n; }
   [[nodiscard]] Index proxies() const { return 5 * n; }
@@ -220,7 +239,10 @@ struct ElasticLoop::State {
   [[nodiscard]] Index forces() const { return 5 * n + (kept + 2) * d; }
   [[nodiscard]] Index drive() const { return forces() + d * ages; }
   [[nodiscard]] Index following() const { return drive() + drives; }
-  [[nodiscard]] Index size() const { return following() + forward; }
+  [[nodiscard]] Index torque() const { return following() + forward; }
+  [[nodiscard]] Index model() const { return torque() + n * torques; }
+  [[nodiscard]] Index band() const { return model() + d * models; }
+  [[nodiscard]] Index size() const { return models > 0 ? band() + 2 * n : band(); }
 };
 
 namespace {
@@ -248,7 +270,17 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopMode
       dimensions_(arm.jacobian.rows()),
       proxies_(loop.order == 2 ? 5 : 4),
       drives_(3 * arm.rotor_kg_m2.size()),
-      forward_(feeds_forward_ ? 2 * joints_ : 0) {
+      forward_(feeds_forward_ ? 2 * joints_ : 0),
+      torque_ratio_(loop.gear_torque_ratio),
+      torque_age_periods_((arm.torque_delay_s + loop.gear_torque_late_s) / loop.period_s),
+      torque_lag_periods_(gear_torque_lag_periods(loop.drive_time_constant_s, arm.torque_delay_s, loop.period_s)) {
+  if (loop.gear_damping.damping_per_s > 0.0 && loop.gear_damping.joints != 0) {
+    yield_rad_per_Nms_ = VectorXd::Zero(joints_);
+    for (Index i = 0; i < joints_; ++i) {
+      if ((loop.gear_damping.joints & 1u << i) != 0)
+        yield_rad_per_Nms_[i] = loop.gear_damping.damping_per_s / arm.stiffness[i];
+    }
+  }
   // A quotient of decimal numbers, hence the 1e-9. Besides the newest force: one older for the interpolation, and two
   // for Störmer's correction at order 2.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + (order_ == 2 ? 3 : 2);
@@ -307,6 +339,7 @@ void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
     block(6, 7) = (-place_share * integral_share * omega2.cwiseProduct(omega)).asDiagonal();
     A.middleRows(6 * n, n) -= rotor.asDiagonal() * gear;
   }
+  gear_ = gear;
   MatrixXd torque = gear;
   torque.leftCols(n) -= product(transposed_product(J, grip.stiffness), J);
   torque.middleCols(n, n) -= product(transposed_product(J, grip.damping), J);
@@ -334,7 +367,7 @@ ElasticLoop::Step ElasticLoop::step_of(const ProxyMatrices& proxy, const MatrixX
 }
 
 Index ElasticLoop::size() const noexcept {
-  return State{joints_, dimensions_, ages_, proxies_, drives_, forward_}.size();
+  return State{joints_, dimensions_, ages_, proxies_, drives_, forward_, kept_torques(), kept_models()}.size();
 }
 
 Index ElasticLoop::plant_size() const noexcept { return 5 * joints_ + drives_ + (feeds_forward_ ? 3 * joints_ : 0); }
@@ -342,7 +375,7 @@ Index ElasticLoop::plant_size() const noexcept { return 5 * joints_ + drives_ + 
 // One period, from just before one reading of the sensor to just before the next.
 void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& next) const {
   const Index n = joints_, d = dimensions_;
-  const State at{n, d, ages_, proxies_, drives_, forward_};
+  const State at{n, d, ages_, proxies_, drives_, forward_, kept_torques(), kept_models()};
   const double T = period_s_;
   const auto old_sent = state.segment(at.sent() + n, n), last_sent = state.segment(at.sent(), n);
 
@@ -356,17 +389,19 @@ void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& nex
   z.segment(5 * n, drives_) = state.segment(at.drive(), drives_);
   if (feeds_forward_) {
     z.segment(5 * n + drives_, forward_) = state.segment(at.following(), forward_);
-    z.tail(n) = (z.segment(4 * n, n) - state.tail(n)) / T;
+    z.tail(n) = (z.segment(4 * n, n) - state.segment(at.following() + n, n)) / T;
   }
   const Place h_now = force_ * z;
   const auto force = [&](Index age) -> Place {
     return age == 0 ? h_now : Place(state.segment(at.forces() + d * (age - 1), d));
   };
-  const auto whole = static_cast<Index>(std::floor(force_age_periods_ + 1e-9));
-  const double rest = std::max(0.0, force_age_periods_ - static_cast<double>(whole));
-  const auto read = [&](Index age) -> Place { return (1.0 - rest) * force(age) + rest * force(age + 1); };
-  Place h = read(whole);
-  if (order_ == 2) h = order2_force[0] * h + order2_force[1] * read(whole + 1) + order2_force[2] * read(whole + 2);
+  const Age age(force_age_periods_);
+  const auto read = [&](Index more) -> Place {
+    return (1.0 - age.rest) * force(age.whole + more) + age.rest * force(age.whole + more + 1);
+  };
+  Place h = read(0);
+  const VectorXd carried = transposed_product(arm_.jacobian, MatrixXd(h));
+  if (order_ == 2) h = order2_force[0] * h + order2_force[1] * read(1) + order2_force[2] * read(2);
 
   Place q = step.of_force * h;
   for (Index i = 1; i <= proxies_; ++i)
@@ -374,7 +409,7 @@ void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& nex
   const Place p = q + horizon_s_ / T * (q - state.segment(at.proxies(), d));
 
   // As in ElasticSetpoint::step().
-  Place x = p, v = Place::Zero(d), acceleration = Place::Zero(d);
+  Place x = p, v = Place::Zero(d), acceleration = Place::Zero(d), mean_acceleration = Place::Zero(d);
   if (arm_.filter_s > 0.0) {
     const double omega = 1.0 / arm_.filter_s, decay = std::exp(-omega * T);
     const Place e = state.segment(at.filter(), d) - p, v_1 = state.segment(at.filter() + d, d);
@@ -382,6 +417,7 @@ void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& nex
     x = p + decay * (e + T * c);
     v = decay * (v_1 - omega * T * c);
     acceleration = omega * omega * (p - x) - 2.0 * omega * v;
+    mean_acceleration = (v - v_1) / T;
   }
 
   const VectorXd then = plant_ * z;
@@ -389,6 +425,7 @@ void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& nex
   next.segment(at.drive(), drives_) = then.segment(5 * n, drives_);
   next.segment(at.following(), forward_) = then.segment(5 * n + drives_, forward_);
   next.segment(at.sent(), n) = arm_.joints_per_m * x + twist_ * acceleration;
+  if (damps()) damp(state, gear_ * z, carried, mean_acceleration, next);
   next.segment(at.sent() + n, n) = last_sent;
   next.segment(at.proxies(), d) = q;
   next.segment(at.proxies() + d, (proxies_ - 1) * d) = state.segment(at.proxies(), (proxies_ - 1) * d);
@@ -396,6 +433,39 @@ void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& nex
   next.segment(at.filter() + d, d) = v;
   next.segment(at.forces(), d) = h_now;
   next.segment(at.forces() + d, d * (ages_ - 1)) = state.segment(at.forces(), d * (ages_ - 1));
+}
+
+Index ElasticLoop::kept_torques() const noexcept { return damps() ? Age(torque_age_periods_).whole + 1 : 0; }
+
+Index ElasticLoop::kept_models() const noexcept { return damps() ? Age(torque_lag_periods_).whole + 1 : 0; }
+
+// As in GearDamping::step(): takes the damping off the setpoint that is sent. M G ẍ_f is what the filter's acceleration
+// asks of the gears.
+void ElasticLoop::damp(const VectorXd& state, const VectorXd& torque_now, const VectorXd& carried,
+                       const Place& acceleration, VectorXd& next) const {
+  const Index n = joints_, d = dimensions_, torques = kept_torques(), models = kept_models();
+  const State at{n, d, ages_, proxies_, drives_, forward_, torques, models};
+  const auto torque = [&](Index age) -> VectorXd {
+    return age == 0 ? torque_now : VectorXd(state.segment(at.torque() + n * (age - 1), n));
+  };
+  const auto model = [&](Index age) -> Place {
+    return age == 0 ? acceleration : Place(state.segment(at.model() + d * (age - 1), d));
+  };
+  const Age age(torque_age_periods_), lag(torque_lag_periods_);
+  const VectorXd measured = (1.0 - age.rest) * torque(age.whole) + age.rest * torque(age.whole + 1);
+  const Place modelled = (1.0 - lag.rest) * model(lag.whole) + lag.rest * model(lag.whole + 1);
+  const VectorXd beside = torque_ratio_ * measured + carried - arm_.stiffness.cwiseProduct(twist_ * modelled);
+  const double decay = std::exp(-gear_damping_band_rad_per_s * period_s_);
+  const VectorXd slow = decay * state.segment(at.band(), n) + (1.0 - decay) * beside;
+  const VectorXd sum =
+      decay * state.segment(at.band() + n, n) + (1.0 - decay) / gear_damping_band_rad_per_s * (beside - slow);
+  next.segment(at.sent(), n) -= yield_rad_per_Nms_.cwiseProduct(sum);
+  next.segment(at.torque(), n) = torque_now;
+  next.segment(at.torque() + n, n * (torques - 1)) = state.segment(at.torque(), n * (torques - 1));
+  next.segment(at.model(), d) = acceleration;
+  next.segment(at.model() + d, d * (models - 1)) = state.segment(at.model(), d * (models - 1));
+  next.segment(at.band(), n) = slow;
+  next.segment(at.band() + n, n) = sum;
 }
 
 double ElasticLoop::spectral_radius(double proxy_mass_kg) const {

@@ -12,6 +12,8 @@
 //   proxy     A(w) q = w^(age/T) h                                                     as in stability.hpp
 //   sent to   p = q + (H/T)(q − q₁)                                                    with lookahead
 //   filter    x_f of p, critically damped; θ_sent = G x_f + k⁻¹ M G ẍ_f                 (elastic_setpoint.hpp)
+//   damping   θ_sent −= (κ/k) y, y = s/(s + a)² (τ − M G ẍ_f)          where the gears' torque τ is measured
+//   (gear_damping.hpp)
 // G = ∂(joint angles)/∂(tool position), orientation held. M includes handle and tool. Over a period the continuous part
 // is integrated exactly, by its matrix exponential. Together this is one linear map from period to period, whose
 // largest eigenvalue decides on stability. For six joints it is a matrix of some 45 rows.
@@ -58,6 +60,7 @@ struct ElasticArm {
   Eigen::MatrixXd axes{};  // of the tool's space in W, a column for each dimension; empty: not a space of places
   // J_r of each rotor, at the joint, and ω_v of its drive; empty: the drives don't yield.
   Eigen::VectorXd rotor_kg_m2{}, drive_rad_per_s{};
+  double torque_delay_s = 0.0;  // how old a reading of the gears' torque is
 };
 
 // Gears without a stiffness are rigid. If a drive doesn't tell its gear's damping, gears have 0.03 of the critical
@@ -122,8 +125,15 @@ class ElasticLoop {
   [[nodiscard]] Eigen::MatrixXd map(const ProxyMatrices& proxy, const Eigen::MatrixXd& forbidden) const;
   void advance(const Eigen::VectorXd& state, const Step& step, Eigen::VectorXd& next) const;
   void make_plant(const Grip& grip, double gear_stiffness_ratio);
+  [[nodiscard]] Eigen::Index kept_torques() const noexcept;  // old ones,
+  [[nodiscard]] Eigen::Index kept_models() const noexcept;   // and accelerations that the model of torques had
+  using Place = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;  // in the tool's space
+  void damp(const Eigen::VectorXd& state, const Eigen::VectorXd& torque_now, const Eigen::VectorXd& carried,
+            const Place& acceleration, Eigen::VectorXd& next) const;
 
   ElasticArm arm_;
+  [[nodiscard]] bool damps() const noexcept { return yield_rad_per_Nms_.size() > 0; }
+
   double period_s_, damping_, spring_, horizon_s_, time_constant_s_;
   bool feeds_forward_;
   double force_age_periods_;
@@ -131,9 +141,12 @@ class ElasticLoop {
   Eigen::MatrixXd plant_;  // the map of [φ, φ̇, θ, r, ṙ, δ, δ̇, ∫δ, θ̇, f, ḟ] over a period
   Eigen::MatrixXd force_;  // h from these
   Eigen::MatrixXd twist_;  // k⁻¹ M G
+  Eigen::MatrixXd gear_;   // the gears' torques from these
   // Numbers of joints n, of tool dimensions, of old forces and proxies that are kept, and of the drives' states: those
   // that yield, 3 n or none, and those that feed forward, 2 n or none.
   Eigen::Index joints_, dimensions_, ages_, proxies_, drives_, forward_;
+  Eigen::VectorXd yield_rad_per_Nms_;  // κ/k of each gear that is damped by its torque; empty: none is
+  double torque_ratio_, torque_age_periods_, torque_lag_periods_;  // of gears that are damped by their torque
 };
 
 }  // namespace proxarm::controller

@@ -192,8 +192,27 @@ std::vector<Touch> touches_of(const ElasticArm& arm, const LoopModel& loop) {
   return touches;
 }
 
+bool damps_gears(const LoopModel& loop) {
+  return loop.gear_damping.damping_per_s > 0.0 && loop.gear_damping.joints != 0 && loop.arms;
+}
+
 // A horizon is chosen, and judged, with drives that lag: they are what it compensates for.
 enum class Drives { lag, both };
+
+// Where gears are damped by their torque, a loop has to hold with each of these, too: the damping is what makes a mass
+// stable, and so it is only as good as what it goes by.
+std::vector<LoopModel> with_torque_errors(const LoopModel& loop) {
+  std::vector<LoopModel> ways{loop};
+  if (!damps_gears(loop)) return ways;
+  LoopModel soft = loop, weak = loop, late = loop;
+  soft.gear_stiffness_ratio = gear_margins.front();
+  weak.gear_torque_ratio = 1.0 - torque_margin;
+  late.gear_torque_ratio = 1.0 + torque_margin;
+  late.gear_torque_late_s = late_torque_s;
+  ways.insert(ways.end(), {weak, late});
+  if (loop.gear_stiffness_ratio == 1.0) ways.push_back(soft);
+  return ways;
+}
 
 LoopModel feeding_forward(LoopModel loop) {
   loop.feed_forward = true;
@@ -206,9 +225,11 @@ class ElasticLoops {
  public:
   ElasticLoops(const HandModel& hand, const LoopModel& loop, Drives drives = Drives::both)
       : damping_(loop.damping_Ns_per_m), spring_(loop.spring_N_per_m) {
-    std::vector<LoopModel> ways{loop};
+    std::vector<LoopModel> ways = with_torque_errors(loop);
     const bool lags = drives == Drives::lag || !loop.either_drive || loop.horizon_s > 0.0;
-    if (!lags && loop.drive_time_constant_s > 0.0 && !loop.feed_forward) ways.push_back(feeding_forward(loop));
+    if (!lags && loop.drive_time_constant_s > 0.0 && !loop.feed_forward) {
+      for (const LoopModel& way : with_torque_errors(loop)) ways.push_back(feeding_forward(way));
+    }
     for (const ElasticArm& arm : *loop.arms) {
       for (const LoopModel& way : ways) loops_.push_back({ElasticLoop(arm, hand, way), touches_of(arm, loop)});
     }
@@ -280,6 +301,9 @@ std::vector<double> springs_of(const LoopModel& loop) {
 // Above this mass the gears don't matter, since the hand's mass is too small beside the proxy's. Besides, rounding
 // couldn't tell the eigenvalues of the slowest modes from 1; a proxy has two that are close to it.
 constexpr double heaviest_on_gears_kg = 50.0;
+
+// What people ask for: between the lightest and what an arm weighs.
+constexpr double usual_kg = 10.0;
 
 // Of a rigid arm: from the top down to the first interval of masses that aren't stable.
 std::optional<double> smallest_on_rigid(const Loop& loop, double max_mass_kg) {
@@ -447,6 +471,40 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
     }
   }
   return steps * T;
+}
+
+namespace {
+// Whether gears as stiff as gear_margins says come to rest under what is felt as usual, in a heavy hand, too.
+bool stiff_gears_hold(const HandModel& hand, LoopModel loop) {
+  loop.gear_stiffness_ratio = gear_margins.back();
+  HandModel heavy = hand;
+  heavy.mass_kg *= heavy_hand;
+  for (const double mass_kg : {heaviest_on_gears_kg, usual_kg}) {
+    if (!(spectral_radius(hand, loop, mass_kg) < 1.0) || !(spectral_radius(heavy, loop, mass_kg) < 1.0)) return false;
+  }
+  return true;
+}
+}  // namespace
+
+double best_gear_damping_per_s(const HandModel& hand, const LoopModel& model) {
+  if (model.gear_damping.joints == 0) return 0.0;
+  LoopModel loop = model;
+  loop.horizon_s = 0.0;
+  loop.order = 1;
+  loop.layers = nullptr;
+  loop.gear_damping.damping_per_s = 0.0;
+  // A κ that isn't stable with a lighter mass than the best one isn't searched.
+  constexpr double lighter = 0.98;
+  double best = 0.0, least_kg = smallest_stable_mass(hand, loop).value_or(heaviest_on_gears_kg);
+  for (const double tried : tried_gear_dampings_per_s) {
+    loop.gear_damping.damping_per_s = tried;
+    if (!(spectral_radius(hand, loop, lighter * least_kg) < 1.0) || !stiff_gears_hold(hand, loop)) continue;
+    const std::optional<double> smallest = smallest_stable_mass(hand, loop);
+    if (!smallest || *smallest >= least_kg) continue;
+    best = tried;
+    least_kg = *smallest;
+  }
+  return best;
 }
 
 LoopModel with_worst_layers(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {

@@ -39,6 +39,7 @@
 #include <optional>
 #include <string>
 
+#include "controller/setpoints/gear_damping.hpp"
 #include "controller/stability/elastic_loop.hpp"
 
 namespace proxarm::controller {
@@ -73,6 +74,10 @@ struct LoopModel {
   bool with_events = true;
   double horizon_s = 0.0;             // H ≥ 0 of the lookahead
   double gear_stiffness_ratio = 1.0;  // > 0, of the arms' true gears to those that the controller believes in
+  // With arms: gears that are damped by their torque (gear_damping.hpp); what is measured of it to the true one, and
+  // how much later it is read than is said.
+  GearDampingChoice gear_damping{};
+  double gear_torque_ratio = 1.0, gear_torque_late_s = 0.0;
   // 1/ω ≥ 0 of the setpoints' filter, whose 2/ω are part of delay_s. It is used when a horizon is chosen: the filter is
   // modelled there as the two first-order lags that it is. Lookahead compensates for their phase; a pure delay would
   // seem worse.
@@ -112,6 +117,15 @@ inline constexpr std::array<double, 3> gear_margins{0.7, 1.0, 1.4};
 // heavy_hand is twice. Precondition: loop.filter_s is the filter's.
 inline constexpr double auto_share = 0.85, heavy_hand = 1.9;
 double stable_horizon_s(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
+
+// What a loop that damps its gears by their torque has to hold with, each alone: torques that are measured a fifth too
+// small; a fifth too large and so much later than is said; gears as soft as gear_margins says.
+inline constexpr double torque_margin = 0.2, late_torque_s = 0.002;
+// The κ of gear damping that a session takes, of the joints that `loop` names: that of these with which the smallest
+// mass is stable. The gears themselves have to come to rest with it, under a proxy so heavy that the hand doesn't
+// matter, with these margins and as stiff as gear_margins says. 0: no κ holds, or none makes a lighter mass stable.
+inline constexpr std::array<double, 7> tried_gear_dampings_per_s{220.0, 180.0, 140.0, 100.0, 70.0, 40.0, 20.0};
+double best_gear_damping_per_s(const HandModel& hand, const LoopModel& loop);
 
 // A damping B, and the smallest mass that is stable with it.
 struct DampedMass {

@@ -46,13 +46,14 @@ std::vector<ArmSetup> setups(bool quick) {
   // lag takes away). Every mass gets 12 of them, since at 0.1 Hz a tenth of a newton counts.
   const auto settling = [quick](double mass) { return std::max(quick ? 3.0 : 12.0, (quick ? 0.6 : 2.0) * mass); };
   const auto add = [&](double mass, double period, double drive, bool wall, bool looks_ahead = false,
-                       const char* cell = "default") {
+                       const char* cell = "default", bool torque = false) {
     list.push_back({.cell = cell,
                     .mass_kg = mass,
                     .period_s = period,
                     .drive_factor = drive,
                     .wall = wall,
                     .looks_ahead = looks_ahead,
+                    .torque = torque,
                     .settling_s = settling(mass),
                     .duration_s = quick ? 10.0 : 30.0,
                     .sines = sines(wall, std::string_view(cell) != "default")});
@@ -74,7 +75,9 @@ std::vector<ArmSetup> setups(bool quick) {
   if (quick) return list;
   for (const char* cell : {"cobot", "seven"}) {
     for (const bool looks_ahead : {false, true}) add(10.0, 1e-3, 1.0, false, looks_ahead, cell);
+    add(10.0, 1e-3, 1.0, false, true, cell, true);
   }
+  for (const double mass : {1.0, 4.0, 10.0}) add(mass, 1e-3, 1.0, false, true, "default", true);
   for (const double inertia : {0.05, 0.2, 0.3}) turn(inertia, 1e-3, 1.0);
   turn(0.1, 2e-3, 1.0);
   turn(0.1, 1e-3, 0.5);
@@ -135,10 +138,10 @@ std::string label(const Table& table, std::size_t row) {
   const bool turning = is_turning(table, row);
   const std::string& cell = table.text(row, table.column("cell"));
   char text[100];
-  std::snprintf(text, sizeof text, "%s%s%g %s, T = %g ms%s%s", cell == "default" ? "" : cell.c_str(),
+  std::snprintf(text, sizeof text, "%s%s%g %s, T = %g ms%s%s%s", cell == "default" ? "" : cell.c_str(),
                 cell == "default" ? "" : ", ", value(turning ? "inertia_kg_m2" : "mass_kg"), turning ? "kg m²" : "kg",
                 1e3 * value("period_s"), value("drive_factor") < 1.0 ? ", slow drives" : "",
-                value("lookahead") != 0.0 ? ", lookahead" : "");
+                value("lookahead") != 0.0 ? ", lookahead" : "", value("torque") != 0.0 ? ", torque measured" : "");
   return text;
 }
 
@@ -155,6 +158,7 @@ std::vector<Column> Fidelity::columns() const {
           {"period_s"},
           {"drive_factor"},
           {"lookahead"},
+          {"torque"},
           {"frequency_Hz"},
           {"force_N"},
           {"travel_m"},
@@ -199,6 +203,7 @@ void add_rows(const ArmSetup& setup, const std::vector<ArmSample>& samples, std:
             setup.period_s,
             setup.drive_factor,
             setup.looks_ahead ? 1.0 : 0.0,
+            setup.torque ? 1.0 : 0.0,
             f};
     for (const double value : felt) row.emplace_back(whole && !turning ? value : std::nan(""));
     for (std::size_t k = 0; k < 5; ++k) row.emplace_back(whole && turning ? felt[k] : std::nan(""));
@@ -292,7 +297,8 @@ json Fidelity::headline(const Table& table, const Options& /*options*/) const {
       {"keys",
        {{"apparent_mass_error_by_setup",
          "by frequency in Hz: |F/a - M|/M in free motion, of x, y and z the worst, for masses, timesteps, drives (slow "
-         "drives: half as fast), with --lookahead auto, and of other cells than the default one"},
+         "drives: half as fast), with --lookahead auto, where the gears' torque is measured, and of other cells than "
+         "the default one"},
         {"apparent_mass_error_by_direction", "the same along each of x, y and z of W"},
         {"apparent_inertia_error_by_setup",
          "|tau/alpha - J|/J of a tool that is turned with 4 kg, about x, y or z, whichever is worst"},

@@ -34,6 +34,7 @@ struct ArmSetup {
   double drive_factor = 1.0;     // on the drives' position bandwidth
   bool wall = false;             // 0.2 m in front, and the hand leans on it
   bool looks_ahead = false;      // --lookahead auto
+  bool torque = false;           // its gears' torque is measured, and they are damped by it
   double settling_s = 2.0;       // before what is returned
   double duration_s = 10.0;      // of what is returned
   std::vector<ArmSine> sines{};  // of the hand's intention

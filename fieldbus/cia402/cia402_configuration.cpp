@@ -254,6 +254,7 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
       torque_feedback_(mode_.torque),
       torque_byte_(extra_torque_byte(drive)),
       mode_byte_(mode_display_byte(drive)),
+      gear_torque_byte_(gear_torque_byte(drive)),
       scale_(drive),
       heartbeat_(drive.node, std::int64_t{settings.drive_heartbeat_timeout_ms} * 1'000'000) {
   if (drive.node < 1 || drive.node > 127) refuse(drive, "node", std::to_string(drive.node), "1 to 127");
@@ -278,10 +279,15 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
   fixed_by_eds_ = losses.fixed;
 }
 
+// Stability was judged with it.
+bool ServoDrive::is_gear_torque(const MappedObject& object) const noexcept {
+  return description_.gear_torque && object.object == object_address(description_.gear_torque->object);
+}
+
 void ServoDrive::leave_out_what_eds_lacks() {
   for (const MappedObject& object : tpdo_mapping(description_)) {
     const bool is_needed = object.object == object_address(description_.objects.statusword) ||
-                           object.object == object_address(description_.objects.position);
+                           object.object == object_address(description_.objects.position) || is_gear_torque(object);
     if (!is_needed && !can_send(*eds_, object)) lose_feedback(object);
   }
 }
@@ -295,6 +301,7 @@ void ServoDrive::lose_feedback(const MappedObject& object) {
   tpdo_bytes_ = pdo_bytes(tpdo_mapping(description_, torque_feedback_));
   torque_byte_ = extra_torque_byte(description_);
   mode_byte_ = mode_display_byte(description_, torque_feedback_);
+  gear_torque_byte_ = gear_torque_byte(description_);
   const char* name = is_torque ? "no torque feedback" : "no such feedback in the record";
   losses_.push_back("no " + to_string(object.object) + " in its TPDO: " + name);
 }
@@ -306,7 +313,7 @@ bool ServoDrive::give_up_feedback(const SdoStep& failed, std::uint32_t abort_cod
   const auto mapping = tpdo_mapping(description_, torque_feedback_);
   constexpr std::uint16_t first_transmit_mapping = 0x1A00;
   if (failed.object.index != first_transmit_mapping || failed.object.sub <= 2) return false;
-  if (failed.object.sub > mapping.size()) return false;
+  if (failed.object.sub > mapping.size() || is_gear_torque(mapping[failed.object.sub - 1U])) return false;
   lose_feedback(mapping[failed.object.sub - 1U]);
   return true;
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "fieldbus/can/byte_order.hpp"
 #include "fieldbus/canopen/canopen_pdo.hpp"
@@ -101,6 +102,10 @@ bool ServoDrive::decode_tpdo(const CanFrame& frame) noexcept {
   if (torque_feedback_) actual_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[6]));
   if (mode_byte_) shown_mode_ = static_cast<std::int8_t>(frame.data[*mode_byte_]);
   if (torque_byte_) extra_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[*torque_byte_]));
+  if (gear_torque_byte_) {
+    const std::uint8_t* at = &frame.data[*gear_torque_byte_];
+    gear_torque_ = description_.gear_torque->bits == 16 ? static_cast<std::int16_t>(read_u16_le(at)) : read_i32_le(at);
+  }
   cycles_without_tpdo_ = 0;
   fresh_ = heard_ = true;
 
@@ -132,6 +137,14 @@ void ServoDrive::judge_state(bool was_enabled) noexcept {
 std::optional<double> ServoDrive::torque_share() const noexcept {
   if (!torque_feedback_ && !torque_byte_) return std::nullopt;
   return 1e-3 * description_.direction * (torque_feedback_ ? actual_torque_ : extra_torque_);
+}
+
+std::optional<double> ServoDrive::gear_torque_Nm() const noexcept {
+  if (!gear_torque_byte_) return std::nullopt;
+  const description::GearTorque& torque = *description_.gear_torque;
+  if (torque.Nm_per_count != 0.0) return torque.Nm_per_count * gear_torque_;
+  const double link_rad = 2.0 * std::numbers::pi * gear_torque_ / torque.counts_per_revolution;
+  return description_.gear_stiffness_Nm_per_rad * (actual_rad() - link_rad);
 }
 
 bool ServoDrive::set_target_rad(double angle_rad) noexcept {

@@ -139,6 +139,8 @@ class ServoDrive final : public CyclicDrive {
   [[nodiscard]] double actual_torque_Nm() const noexcept { return actual_torque_ / torque_per_Nm_; }
   // In torque mode, and of a drive that takes positions where the cell's `feedback` has 6077h.
   [[nodiscard]] std::optional<double> torque_share() const noexcept override;
+  // Of a cell whose drive has `gear_torque`; a second encoder's is the stiffness times the windup.
+  [[nodiscard]] std::optional<double> gear_torque_Nm() const noexcept override;
   [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
   [[nodiscard]] std::int32_t actual_counts() const noexcept override { return actual_counts_; }
   [[nodiscard]] double actual_rad() const noexcept override { return scale_.angle_rad(actual_counts_); }
@@ -170,13 +172,15 @@ class ServoDrive final : public CyclicDrive {
     state(heartbeat_, goal_, state_, fault_, statusword_, controlword_, actual_counts_, target_counts_,
           boot_ups_at_start_, cycles_without_tpdo_, held_, held_pending_, cycling_, old_fault_, fresh_, heard_,
           following_, emergency_, emergencies_, repeated_tpdos_, target_torque_, actual_torque_, torque_per_Nm_,
-          tpdo_bytes_, torque_feedback_, tpdos_in_cycle_, doubled_cycles_, shown_mode_, stuck_, warnings_);
+          tpdo_bytes_, torque_feedback_, tpdos_in_cycle_, doubled_cycles_, shown_mode_, stuck_, warnings_,
+          gear_torque_);
   }
 
  private:
   void set_up_torque();
   void lose_feedback(const MappedObject& object);
   void leave_out_what_eds_lacks();
+  [[nodiscard]] bool is_gear_torque(const MappedObject& object) const noexcept;
   [[nodiscard]] std::vector<SdoStep> all_profile_steps() const;
   [[nodiscard]] std::vector<SdoStep> profile_steps() const;  // without those that the cell has it skip
   void note_skipped();
@@ -195,6 +199,7 @@ class ServoDrive final : public CyclicDrive {
   bool torque_feedback_;                     // in TPDO1, behind the position
   std::optional<std::uint8_t> torque_byte_;  // of 6077h among the feedback that nothing depends on
   std::optional<std::uint8_t> mode_byte_;    // of 6061h among that feedback: it is watched
+  std::optional<std::uint8_t> gear_torque_byte_;
   std::vector<std::string> losses_;
   std::string fixed_by_eds_;  // until the drive itself has been asked
   CountScale scale_;
@@ -209,6 +214,7 @@ class ServoDrive final : public CyclicDrive {
   std::int32_t target_counts_ = 0;
   std::int16_t target_torque_ = 0, actual_torque_ = 0;
   std::int16_t extra_torque_ = 0;  // at torque_byte_
+  std::int32_t gear_torque_ = 0;   // counts
   std::uint64_t boot_ups_at_start_ = 0;
   std::uint32_t cycles_without_tpdo_ = 0;
   int held_ = 0;  // SYNCs that latched a target equal to the actual position, in the state switched on

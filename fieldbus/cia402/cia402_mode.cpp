@@ -35,6 +35,7 @@ std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& driv
   for (const description::DriveFeedback& more : drive.feedback) {
     mapping.push_back({object_address(more.object), more.bits});
   }
+  if (drive.gear_torque) mapping.push_back({object_address(drive.gear_torque->object), drive.gear_torque->bits});
   return mapping;
 }
 
@@ -63,6 +64,13 @@ std::optional<std::uint8_t> mode_display_byte(const description::DriveDescriptio
                                               bool torque_feedback) noexcept {
   const bool torque = mode_of(drive).torque && torque_feedback;
   return feedback_byte(drive, drive.objects.mode_display, 8, statusword_and_position + (torque ? actual_torque : 0));
+}
+
+std::optional<std::uint8_t> gear_torque_byte(const description::DriveDescription& drive) noexcept {
+  if (!drive.gear_torque) return std::nullopt;
+  unsigned bits = statusword_and_position;
+  for (const description::DriveFeedback& more : drive.feedback) bits += more.bits;
+  return static_cast<std::uint8_t>(bits / 8);
 }
 
 std::uint8_t pdo_bytes(const std::vector<MappedObject>& mapping) noexcept {

@@ -41,6 +41,8 @@ struct CyclicMode {
 // The first byte of the actual torque (6077h, 16 bits) in TPDO1 of a drive that takes positions; none: its cell's
 // `feedback` doesn't have it.
 [[nodiscard]] std::optional<std::uint8_t> extra_torque_byte(const description::DriveDescription& drive) noexcept;
+// The first byte of `gear_torque`, which comes last.
+[[nodiscard]] std::optional<std::uint8_t> gear_torque_byte(const description::DriveDescription& drive) noexcept;
 // The byte of the mode display (6061h, 8 bits) in TPDO1, where the cell's `feedback` has it.
 [[nodiscard]] std::optional<std::uint8_t> mode_display_byte(const description::DriveDescription& drive,
                                                             bool torque_feedback = true) noexcept;

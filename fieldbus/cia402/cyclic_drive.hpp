@@ -59,6 +59,8 @@ class CyclicDrive {
   [[nodiscard]] virtual double actual_rad() const noexcept = 0;
   // The motor's torque as a share of the rated one (6077h), by the sense of the joint; none: the drive doesn't tell it.
   [[nodiscard]] virtual std::optional<double> torque_share() const noexcept { return std::nullopt; }
+  // Of the joint's gear on its link, by the joint's sense, as its latest answer says; none: it isn't measured.
+  [[nodiscard]] virtual std::optional<double> gear_torque_Nm() const noexcept { return std::nullopt; }
   [[nodiscard]] virtual std::int32_t target_counts() const noexcept = 0;
   [[nodiscard]] virtual double target_rad() const noexcept = 0;
   [[nodiscard]] virtual DriveFault fault() const noexcept = 0;  // the first one

@@ -124,6 +124,10 @@ SimulatedDrive read_simulation(const YamlNode& node) {
   s.torque_ripple_per_revolution =
       static_cast<int>(node.integer_or("torque_ripple_per_revolution", s.torque_ripple_per_revolution, 1, 1000));
   s.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
+  s.gear_torque_ratio = node.number_or("gear_torque_ratio", s.gear_torque_ratio, -10.0, 10.0);
+  s.gear_torque_offset_Nm = node.number_or("gear_torque_offset_Nm", s.gear_torque_offset_Nm, -1e5, 1e5);
+  s.gear_torque_noise_Nm = node.number_or("gear_torque_noise_Nm", s.gear_torque_noise_Nm, 0.0, 1e4);
+  s.gear_torque_hysteresis_Nm = node.number_or("gear_torque_hysteresis_Nm", s.gear_torque_hysteresis_Nm, 0.0, 1e4);
   s.brake_torque_Nm = node.number_or("brake_torque_Nm", s.brake_torque_Nm, 0.0, 1e6);
   s.brake_delay_s = node.number_or("brake_delay_s", s.brake_delay_s, 0.0, 1.0);
   s.position_gain_per_s = node.number("position_gain_per_s", above(0.0, 1e4));
@@ -199,22 +203,42 @@ DriveObjects read_objects(const YamlNode& node) {
   return o;
 }
 
-// Statusword, position and, with torques, the actual one come first.
-std::vector<DriveFeedback> read_feedback(const YamlNode& node, const DriveDescription& drive) {
+std::vector<DriveFeedback> read_feedback(const YamlNode& node) {
   std::vector<DriveFeedback> feedback;
-  int bytes = drive.mode == "cst" ? 8 : 6;
-  const int most = drive.fd ? 64 : 8;
   for (const YamlNode& each : node.list("feedback", 1, 64)) {
     feedback.push_back({read_object(each, "object"), static_cast<std::uint8_t>(integer_of(each, "bits", {8, 16, 32}))});
-    bytes += feedback.back().bits / 8;
-  }
-  if (bytes > most) {
-    throw node.error_at("feedback",
-                        "at most " + std::to_string(most) + " bytes with statusword and position" +
-                            (drive.fd ? "" : " (64 with fd: true)"),
-                        std::to_string(bytes) + " bytes");
   }
   return feedback;
+}
+
+// A torque by its counts, or an angle by those of a second encoder.
+GearTorque read_gear_torque(const YamlNode& node) {
+  GearTorque torque;
+  torque.object = read_object(node, "object");
+  torque.bits = static_cast<std::uint8_t>(integer_of_or(node, "bits", 16, {16, 32}));
+  torque.Nm_per_count = node.number_or("Nm_per_count", 0.0, -1e4, 1e4);
+  torque.counts_per_revolution = node.number_or("counts_per_revolution", 0.0, -4294967296.0, 4294967296.0);
+  torque.delay_s = node.number_or("delay_s", 0.0, 0.0, longest_gear_torque_delay_s);
+  const bool is_sensor = torque.Nm_per_count != 0.0, is_encoder = torque.counts_per_revolution != 0.0;
+  if (is_sensor == is_encoder) {
+    throw node.error_at("Nm_per_count", "this of a torque sensor, or counts_per_revolution of a second encoder",
+                        is_sensor ? "both" : "neither");
+  }
+  if (is_encoder && torque.bits != 32) throw node.error_at("bits", "32 of a second encoder: its counts would run over");
+  return torque;
+}
+
+// Statusword, position and, with torques, the actual one come first.
+void require_room_in_tpdo(const YamlNode& node, const DriveDescription& drive) {
+  int bytes = drive.mode == "cst" ? 8 : 6;
+  for (const DriveFeedback& more : drive.feedback) bytes += more.bits / 8;
+  if (drive.gear_torque) bytes += drive.gear_torque->bits / 8;
+  const int most = drive.fd ? 64 : 8;
+  if (bytes <= most) return;
+  throw node.error_at(drive.gear_torque ? "gear_torque" : "feedback",
+                      "at most " + std::to_string(most) + " bytes with statusword and position" +
+                          (drive.fd ? "" : " (64 with fd: true)"),
+                      std::to_string(bytes) + " bytes");
 }
 
 std::vector<StartUpWrite> read_writes(const YamlNode& node) {
@@ -286,7 +310,12 @@ DriveDescription read_drive(const YamlNode& node) {
     if (node.has("eds")) d.eds = node.existing_file("eds").string();
     if (const auto objects = node.find_map("objects")) d.objects = read_objects(*objects);
     d.fd = node.boolean_or("fd", false);
-    if (node.has("feedback")) d.feedback = read_feedback(node, d);
+    if (node.has("feedback")) d.feedback = read_feedback(node);
+    if (const auto torque = node.find_map("gear_torque")) d.gear_torque = read_gear_torque(*torque);
+    if (d.gear_torque && d.mode == "cst") {
+      throw node.error_at("gear_torque", "none with mode: cst, which has no setpoints that could yield to it");
+    }
+    require_room_in_tpdo(node, d);
   }
   if (!d.on_can()) d.word_order_tried = node.boolean_or("word_order_tried", false);
   if (const auto bring_up = node.find_map("bring_up")) d.bring_up = read_bring_up(*bring_up, d);
@@ -312,6 +341,10 @@ DriveDescription read_drive(const YamlNode& node) {
   d.rotor_inertia_kg_m2 = node.number("rotor_inertia_kg_m2", 0.0, 1e5);
   d.position_bandwidth_Hz = node.number_or("position_bandwidth_Hz", 100.0, 1.0, 10000.0);
   d.gear_stiffness_Nm_per_rad = node.number_or("gear_stiffness_Nm_per_rad", 0.0, 0.0, 1e9);
+  if (d.gear_torque && !(d.gear_stiffness_Nm_per_rad > 0.0)) {
+    throw node.error_at("gear_torque",
+                        "gear_stiffness_Nm_per_rad above 0 with it: the gear is damped through its give");
+  }
   if (node.has("gear_damping_Nms_per_rad")) {
     d.gear_damping_Nms_per_rad = node.number("gear_damping_Nms_per_rad", 0.0, 1e6);
   }

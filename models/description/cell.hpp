@@ -60,11 +60,15 @@ struct SimulatedDrive {
   double torque_ripple_Nm = 0.0;          // amplitude of the motor's, at the joint, with current or without
   int torque_ripple_per_revolution = 6;   // periods of it in a turn of the motor
   double max_torque_Nm = 0.0;             // current limit, as torque at the joint
-  double brake_torque_Nm = 0.0;           // that the closed brake holds or brakes with; 0: without limit
-  double brake_delay_s = 0.0;             // from the power being gone to the brake being closed
-  double position_gain_per_s = 0.0;       // outer loop of the cascade
-  double velocity_bandwidth_Hz = 0.0;     // inner loop
-  double velocity_feedforward = 1.0;      // of the interpolated setpoint
+  // Of `gear_torque`, beside what is true: a factor, a constant, a standard deviation of white noise, and how wide the
+  // loop of readings is over the true torque.
+  double gear_torque_ratio = 1.0, gear_torque_offset_Nm = 0.0, gear_torque_noise_Nm = 0.0;
+  double gear_torque_hysteresis_Nm = 0.0;
+  double brake_torque_Nm = 0.0;        // that the closed brake holds or brakes with; 0: without limit
+  double brake_delay_s = 0.0;          // from the power being gone to the brake being closed
+  double position_gain_per_s = 0.0;    // outer loop of the cascade
+  double velocity_bandwidth_Hz = 0.0;  // inner loop
+  double velocity_feedforward = 1.0;   // of the interpolated setpoint
   double acceleration_feedforward = 1.0;
   double servo_rate_Hz = 4000.0;
   // "strict", "latching", "lazy", "holding", "insisting": sim/canopen/stack_behaviour.hpp
@@ -94,6 +98,19 @@ struct DriveObjects {
 struct DriveFeedback {
   std::uint32_t object = 0;  // index << 8 | sub-index
   std::uint8_t bits = 0;     // 8, 16, 32
+};
+
+// Of `gear_torque`: what comes later damps nothing at the frequencies that arms swing with.
+inline constexpr double longest_gear_torque_delay_s = 0.005;
+
+// How a drive tells the torque of its joint's gear: by a torque sensor on the link's side, or by a second encoder
+// there, whose angle the gear's windup is found from. It is in TPDO1, last.
+struct GearTorque {
+  std::uint32_t object = 0;            // index << 8 | sub-index
+  std::uint8_t bits = 16;              // 16, 32; signed
+  double Nm_per_count = 0.0;           // by the joint's sense, may be negative; 0: a second encoder
+  double counts_per_revolution = 0.0;  // of the second encoder, at the joint, likewise
+  double delay_s = 0.0;                // from the gear to the SYNC whose TPDO has it
 };
 
 // An object that is written before the PDOs are mapped, and read back.
@@ -139,6 +156,7 @@ struct DriveDescription {
   DriveObjects objects;            // cia402
   bool fd = false;                 // cia402: its PDOs are CAN FD frames at the data bitrate
   std::vector<DriveFeedback> feedback;       // cia402: behind what the controller needs, for the record
+  std::optional<GearTorque> gear_torque;     // cia402, modes csp and ip; none: it isn't measured
   std::optional<std::uint32_t> device_type;  // expected in 1000h; none: what `eds` says, or a CiA 402 servo drive's
   double counts_per_motor_revolution = 1048576.0;
   double gear_ratio = 100.0;       // motor revolutions per joint revolution

@@ -23,6 +23,8 @@ bool PlantAxis::set_fault(const DeviceFault& fault, bool on, std::int64_t time_n
       stuck_at_counts_ = servo_.position_counts();
       stuck_ = on;
       return true;
+    case DeviceFaultKind::torque_stuck:
+      return plant_.stick_gear_torque(axis_, on);
     default:
       return false;
   }

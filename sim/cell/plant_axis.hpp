@@ -47,6 +47,7 @@ class PlantAxis final : public ServoAxis {
   [[nodiscard]] double torque_ratio() const noexcept override {
     return std::copysign(1.0, counts_per_rad_) * servo_.torque_Nm() / rated_torque_Nm_;
   }
+  [[nodiscard]] std::int32_t gear_torque_counts() const noexcept override { return plant_.gear_torque_counts(axis_); }
   [[nodiscard]] bool limited() const noexcept override { return servo_.limited(); }
   [[nodiscard]] bool at_rest() const noexcept override { return servo_.at_rest(); }
 

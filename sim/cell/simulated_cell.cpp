@@ -67,6 +67,7 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   if (eds != nullptr) take_identity(*eds, c.canopen);
   c.eds = eds;
   c.objects = drive.objects;
+  c.gear_torque = drive.gear_torque;
   if (const std::uint32_t target = drive.objects.target; target != 0) {
     (drive.mode == "ip" ? c.interpolated_target : drive.mode == "cst" ? c.torque_target : c.position_target) = target;
   }

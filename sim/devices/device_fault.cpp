@@ -64,6 +64,7 @@ constexpr KindName kinds[] = {
     {"weak", drives, DeviceFaultKind::weak, none, description::parse_torque},
     {"offset", drives, DeviceFaultKind::offset, none, description::parse_angle, true},
     {"stuck", drives, DeviceFaultKind::stuck, none},
+    {"torque_stuck", can, DeviceFaultKind::torque_stuck, none},
     {"exception", modbus, DeviceFaultKind::modbus_exception, last_exception},
     {"lost", modbus, DeviceFaultKind::modbus_lost, u16},
     {"closed", modbus, DeviceFaultKind::modbus_closed, none},

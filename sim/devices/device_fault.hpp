@@ -55,6 +55,7 @@ enum class DeviceFaultKind : std::uint8_t {
   weak,            // "weak": its motor gives no more than AMOUNT Nm, at the joint
   offset,          // "offset": the position that it reports is AMOUNT rad too large
   stuck,           // "stuck": it reports one position whatever it does
+  torque_stuck,    // "torque_stuck": what it measures of its gear's torque repeats its last reading
   // Those that spoil a position's way (runaway) are no fault of a drive that takes torques.
   // Drives on a Modbus line, which know "silent", "power", "jammed" and what follows that as well
   modbus_exception,       // "exception": each request is answered by exception VALUE

@@ -91,6 +91,10 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   max_torque_ = &od.add(0x6072, 0, unsigned16, read_write, 3000);
   od.add(0x6076, 0, unsigned32, constant, config.rated_torque_mNm);
   torque_ = &add(at.torque, integer16, read_only, 0, true);
+  if (config.gear_torque) {
+    const DataType type = config.gear_torque->bits == 16 ? integer16 : integer32;
+    gear_torque_ = &add(config.gear_torque->object, type, read_only, 0, true);
+  }
   following_error_ = &od.add(0x60F4, 0, integer32, read_only, 0, true);
   digital_inputs_ = &od.add(0x60FD, 0, unsigned32, read_only, 0, true);
   std::int64_t supported = 0;
@@ -280,6 +284,7 @@ void DriveDevice::publish() noexcept {
   velocity_->set(
       static_cast<std::int64_t>(std::isfinite(speed) ? std::clamp(speed, -2147483648.0, 2147483647.0) : 0.0));
   torque_->set(static_cast<std::int64_t>(std::lround(1000.0 * std::clamp(axis_.torque_ratio(), -32.767, 32.767))));
+  if (gear_torque_ != nullptr) gear_torque_->set(axis_.gear_torque_counts());
   statusword_->set(statusword());
 }
 

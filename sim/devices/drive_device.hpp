@@ -47,7 +47,8 @@ struct DriveDeviceConfig {
   // Where it has something else than the profile says, as index << 8 | sub-index.
   description::DriveObjects objects{};
   std::uint32_t position_target = 0x607A00, interpolated_target = 0x60C101, torque_target = 0x607100;
-  const description::EdsFile* eds = nullptr;  // whose dictionary it has (eds_objects.hpp), or its own
+  std::optional<description::GearTorque> gear_torque{};  // what it tells of its gear
+  const description::EdsFile* eds = nullptr;             // whose dictionary it has (eds_objects.hpp), or its own
 };
 
 // Why operation was refused, 2001h.
@@ -154,7 +155,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
               *mode_ = nullptr, *mode_display_ = nullptr, *error_code_ = nullptr, *refusal_ = nullptr,
               *period_value_ = nullptr, *period_index_ = nullptr, *following_window_ = nullptr,
               *interpolated_target_ = nullptr, *sync_tolerance_ = nullptr, *target_torque_ = nullptr,
-              *max_torque_ = nullptr, *digital_inputs_ = nullptr;
+              *max_torque_ = nullptr, *gear_torque_ = nullptr, *digital_inputs_ = nullptr;
 
   std::int64_t now_ns_ = 0;
   DriveState state_ = DriveState::not_ready_to_switch_on;

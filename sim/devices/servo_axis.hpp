@@ -30,8 +30,10 @@ class ServoAxis {
   [[nodiscard]] virtual std::int32_t demand_counts() const noexcept = 0;
   [[nodiscard]] virtual double speed_counts_per_s() const noexcept = 0;
   [[nodiscard]] virtual double torque_ratio() const noexcept = 0;  // of the rated torque
-  [[nodiscard]] virtual bool limited() const noexcept = 0;         // torque or speed is at its limit
-  [[nodiscard]] virtual bool at_rest() const noexcept = 0;         // the demand
+  // What measures the gear's torque reads, as DriveDescription::gear_torque has it; 0 where nothing does.
+  [[nodiscard]] virtual std::int32_t gear_torque_counts() const noexcept { return 0; }
+  [[nodiscard]] virtual bool limited() const noexcept = 0;  // torque or speed is at its limit
+  [[nodiscard]] virtual bool at_rest() const noexcept = 0;  // the demand
 };
 
 }  // namespace proxarm::sim

@@ -58,6 +58,12 @@ Plant::Plant(const Cell& cell, const description::SensorDescription& sensor, con
     servos_.back().reset(arm_.motor_angle_rad(i), arm_.static_torque_Nm(i));
   }
   torque_Nm_.assign(servos_.size(), 0.0);
+  gear_torques_.resize(servos_.size());
+  for (std::size_t i = 0; i < servos_.size(); ++i) {
+    if (!cell.drives[i].gear_torque) continue;
+    gear_torques_[i].emplace(cell.drives[i], step_ns_, config.noise_seed + 1 + i);
+    gear_torques_[i]->reset(arm_.gear_torque_Nm(i), arm_.joint_angle_rad(i));
+  }
   force_sensor_.reset(time_ns_, arm_.sensor_wrench_S());
   const auto steps = static_cast<std::size_t>(std::llround(1e9 * cell.sensor.delay_s / static_cast<double>(step_ns_)));
   sensed_.assign(steps, arm_.sensor_wrench_S());
@@ -117,6 +123,9 @@ void Plant::step() noexcept {
   models::Vec3 arm_W = models::Vec3::Zero();
   if (clamp_) (clamp_->felt ? hand_W : arm_W) += clamp_->force_W(tool.X_WT.translation());
   arm_.apply(torque_Nm_, hand_W, arm_W, hand_.torque_W(hand_time_s, tool.X_WT.linear(), tool.angular_velocity_W));
+  for (std::size_t i = 0; i < gear_torques_.size(); ++i) {
+    if (gear_torques_[i]) gear_torques_[i]->set(arm_.gear_torque_Nm(i), arm_.joint_angle_rad(i));
+  }
   models::Wrench wrench_S = arm_.sensor_wrench_S();
   if (!sensed_.empty()) {
     std::swap(wrench_S, sensed_[next_sensed_]);

@@ -17,6 +17,7 @@
 #include "sim/physics/arm_dynamics.hpp"
 #include "sim/physics/clamp.hpp"
 #include "sim/physics/force_sensor_model.hpp"
+#include "sim/physics/gear_torque_sensor.hpp"
 #include "sim/physics/hand.hpp"
 #include "sim/physics/servo_loop.hpp"
 
@@ -57,6 +58,15 @@ class Plant {
   }
   [[nodiscard]] const ServoLoop& servo(std::size_t axis) const noexcept { return servos_[axis]; }
   [[nodiscard]] const ForceSensorModel& force_sensor() const noexcept { return force_sensor_; }
+  // What measures an axis' gear reads; 0 where nothing does.
+  [[nodiscard]] std::int32_t gear_torque_counts(std::size_t axis) const noexcept {
+    return gear_torques_[axis] ? gear_torques_[axis]->counts() : 0;
+  }
+  // From now on it repeats its last reading, or no longer does; false: this axis has none.
+  bool stick_gear_torque(std::size_t axis, bool stuck) noexcept {
+    if (gear_torques_[axis]) gear_torques_[axis]->stick(stuck);
+    return gear_torques_[axis].has_value();
+  }
   [[nodiscard]] SensorLies& sensor_lies() noexcept { return force_sensor_.lies(); }
   [[nodiscard]] ArmDynamics& arm() noexcept { return arm_; }
   [[nodiscard]] const ArmDynamics& arm() const noexcept { return arm_; }
@@ -98,6 +108,7 @@ class Plant {
   Hand hand_;
   ForceSensorModel force_sensor_;
   std::vector<ServoLoop> servos_;
+  std::vector<std::optional<GearTorqueSensor>> gear_torques_;  // of each axis
   std::vector<std::int64_t> servo_period_ns_;
   std::vector<Brake> brakes_;
   std::optional<Clamp> clamp_;

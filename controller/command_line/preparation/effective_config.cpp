@@ -40,6 +40,7 @@ std::string effective_config(const PreparedSession& session) {
   number(out, "spring_N_per_m", settings.spring_N_per_m);
   out << YAML::Key << "order" << YAML::Value << settings.order;
   number(out, "lookahead_s", settings.horizon_s);
+  number(out, "gear_damping_per_s", settings.gear_damping_per_s);
   out << YAML::Key << "orientation" << YAML::Value
       << (settings.orientation == controller::OrientationMode::held ? "held" : "free");
   constexpr const char* passivity[] = {"off", "observe", "auto", "on"};

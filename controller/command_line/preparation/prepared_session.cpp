@@ -527,6 +527,21 @@ double longest_horizon_s(const PreparedSession& session) {
   return controller::stable_horizon_s(hand_model(session), loop, proxy_kg);
 }
 
+namespace {
+// In the start pose: gears aren't others elsewhere.
+void choose_gear_damping(PreparedSession& session) {
+  controller::GearDampingChoice& chosen = session.loop.gear_damping;
+  chosen = {};
+  if (session.damps_gears) {
+    chosen.joints =
+        controller::damped_joints(models::Arm(session.cell), session.cell.drives, session.settings.period_s);
+    chosen.damping_per_s = controller::best_gear_damping_per_s(hand_model(session), session.loop);
+  }
+  session.settings.gear_damping_per_s = chosen.damping_per_s;
+  session.settings.damped_gears = chosen.joints;
+}
+}  // namespace
+
 void choose_horizon(PreparedSession& session) {
   using Kind = LookaheadChoice::Kind;
   double horizon_s = session.lookahead.kind == Kind::fixed ? session.lookahead.horizon_s : 0.0;
@@ -595,6 +610,8 @@ PreparedSession prepare(const RunOptions& options) {
   session.settings.report_rate_Hz = slowest_report_Hz(session.cell);
   session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;
   require_renderable_tool(session);
+  session.damps_gears = options.damps_gears;
+  choose_gear_damping(session);
   choose_horizon(session);
   return session;
 }
@@ -603,6 +620,16 @@ PreparedSession with_timestep(PreparedSession session, const RunOptions& options
   set_timestep(session, options, period_s);
   session.loop.delay_s = loop_delay_s(session);
   if (!session.impedance()) choose_horizon(session);
+  return session;
+}
+
+PreparedSession with_gear_torques(PreparedSession session, const description::GearTorque& torque) {
+  for (description::DriveDescription& drive : session.cell.drives) {
+    if (drive.gear_stiffness_Nm_per_rad > 0.0) drive.gear_torque = torque;
+  }
+  session.loop.arms = arms_at(session, controller::led_poses(models::Arm(session.cell), {}));
+  choose_gear_damping(session);
+  choose_horizon(session);
   return session;
 }
 

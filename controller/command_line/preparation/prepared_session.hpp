@@ -26,6 +26,7 @@ struct PreparedSession {
       rigid;  // scene and tool, for questions of room; null: the tool is a point
   controller::SessionSettings settings;
   double duration_s = 10.0;
+  bool damps_gears = true;     // whose torque is measured, as hard as holds
   LookaheadChoice lookahead;   // what was asked for; settings.horizon_s is what came of it
   controller::LoopModel loop;  // how the controller expects the closed loop to behave, in the start pose
 
@@ -70,6 +71,9 @@ PreparedSession with_timestep(PreparedSession session, const RunOptions& options
 // The same session with another mass (kg) and centre of mass (m, in S) of the tool behind the sensor. The inertia of a
 // tool with a shape that turns stays as it is felt.
 PreparedSession with_tool(PreparedSession session, double mass_kg, const std::array<double, 3>& centre_S_m);
+
+// The same session with drives that measure the torque of each gear that has a stiffness, so.
+PreparedSession with_gear_torques(PreparedSession session, const description::GearTorque& torque);
 
 // Where the timestep comes from, as a problem begins that is to be told of it: `--timestep`, or the cell's file and
 // line. Without a line, the file says nothing of it and has the default.

@@ -66,6 +66,7 @@ struct RunOptions {
       orientation;  // unset: free where one of the next three is given, else held
   std::optional<double> inertia_kg_m2, turning_damping_Nms_per_rad, turning_spring_Nm_per_rad;
   std::optional<LookaheadChoice> lookahead;  // unset: off
+  bool damps_gears = true;                   // where their torque is measured
   controller::SessionSettings settings;      // all that isn't optional above
   BusMapping bus;
   std::optional<Pace> pace;          // unset: virtual in-process, real time on an interface

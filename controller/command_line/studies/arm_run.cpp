@@ -28,6 +28,9 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   }
   options.scene = shipped_file(setup.wall ? "scenes/frictionless_wall.yaml" : "scenes/free.yaml");
   PreparedSession session = prepare(options);
+  if (setup.torque) {
+    session = with_gear_torques(session, {.object = 0x203100, .bits = 16, .Nm_per_count = 0.05, .delay_s = 0.0005});
+  }
   session.hand.waypoints.clear();
   session.hand.multisine.clear();
   if (setup.wall) {

@@ -20,7 +20,7 @@ using testing::Watched;
 struct AdmittanceMotionTest : ::testing::Test {
   AdmittanceMotionTest() {
     measured.motor_rad = measured.drive_target_rad = arm.motor_from_link(arm.start_rad());
-    measured.moved_rad = measured.feedback_period_s = JointVector::Zero(6);
+    measured.moved_rad = measured.answers.period_s = JointVector::Zero(6);
     measured.fresh = measured.following = 0b111111;
     follow();
     motion->wait_for_drives(measured);

@@ -49,10 +49,10 @@ TEST_F(MeasurementTest, CountsTheCyclesWithoutAnAnswer) {
   EXPECT_EQ(measurement.now().fresh, 0b111011);
   drives[2].is_fresh = true;
   measurement.take();
-  EXPECT_EQ(measurement.now().unheard_cycles[2], 2.0) << "before this one";
+  EXPECT_EQ(measurement.now().answers.unheard_cycles[2], 2.0) << "before this one";
   EXPECT_EQ(measurement.now().fresh, 0b111111);
   measurement.take();
-  EXPECT_EQ(measurement.now().unheard_cycles[2], 0.0);
+  EXPECT_EQ(measurement.now().answers.unheard_cycles[2], 0.0);
 }
 
 TEST_F(MeasurementTest, KeepsTheLastReadingWhereNoneComes) {
@@ -128,7 +128,7 @@ TEST_F(MeasurementTest, CountsInTheNewTimestep) {
   EXPECT_NEAR(measurement.now().moved_rad[0], 2e-3, 1e-15) << "at the same speed";
   drives[3].is_fresh = true;
   measurement.take();
-  EXPECT_EQ(measurement.now().unheard_cycles[3], 0.5);
+  EXPECT_EQ(measurement.now().answers.unheard_cycles[3], 0.5);
 }
 
 }  // namespace

@@ -212,6 +212,44 @@ TEST_F(Cia402DriveTest, WatchesItsModeWhereItIsMapped) {
   EXPECT_EQ(drive.fault(), DriveFault::mode_changed);
 }
 
+// Behind statusword, position and what the record wants; signed, by the sense that the cell says.
+TEST_F(Cia402DriveTest, ReadsTheTorqueOfItsGear) {
+  DriveDescription description = thousand_counts_per_rad();
+  description.gear_torque = description::GearTorque{.object = 0x203100, .bits = 16, .Nm_per_count = -0.5};
+  drive = ServoDrive(description, DriveSettings{});
+  std::vector<std::uint32_t> mapped;
+  for (const SdoStep& step : drive.configuration_steps()) {
+    if (step.object.index == 0x1A00 && step.object.sub > 0) mapped.push_back(step.value);
+  }
+  EXPECT_EQ(mapped, (std::vector<std::uint32_t>{0x60410010, 0x60640020, 0x20310010}));
+  drive.start_cycle(now_ns);
+  cycle("183#3712640000009CFF");
+  EXPECT_DOUBLE_EQ(drive.gear_torque_Nm().value(), 50.0) << "-100 counts of -0.5 Nm";
+  EXPECT_EQ(drive.actual_counts(), 100);
+  cycle("183#371264000000");
+  EXPECT_EQ(drive.fault(), DriveFault::pdo_short) << "without it, nothing damps what was judged as damped";
+  EXPECT_FALSE(ServoDrive(thousand_counts_per_rad(), DriveSettings{}).gear_torque_Nm());
+}
+
+TEST(Cia402FdDrive, FindsItsGearsTorqueByASecondEncoder) {
+  DriveDescription description = thousand_counts_per_rad();
+  description.fd = true;
+  description.feedback = {{0x606100, 8}};
+  description.gear_stiffness_Nm_per_rad = 1e5;
+  const double counts = 1e6 * 2.0 * std::numbers::pi;  // a microradian each
+  description.gear_torque = description::GearTorque{.object = 0x60E401, .bits = 32, .counts_per_revolution = -counts};
+  ServoDrive drive(description, DriveSettings{});
+  CanFrame tpdo;
+  tpdo.id = 0x183;
+  tpdo.fd = tpdo.bit_rate_switch = true;
+  tpdo.length = 12;  // of 11 bytes
+  // The motor at 100 counts, 0.1 rad; the link at 0.0999 rad, -99900 counts.
+  tpdo.data = {0x50, 0x02, 0x64, 0x00, 0x00, 0x00, 0x08, 0xC4, 0x79, 0xFE, 0xFF};
+  drive.on_sync(ms);
+  EXPECT_TRUE(drive.on_frame(tpdo, ms));
+  EXPECT_NEAR(drive.gear_torque_Nm().value(), 10.0, 1e-6);
+}
+
 TEST_F(Cia402DriveTest, SaysWhereItStoodWhenItWasGivenUp) {
   const std::pair<const char*, const char*> rows[] = {
       {"183#400200000000",
