@@ -27,11 +27,11 @@ constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r'
 void archive(fieldbus::StateArchive& state, SessionSettings& s) noexcept {
   static_assert(sizeof(SessionSettings) == 240, "a new setting belongs into this list");
   state(s.scheme, s.coupling_stiffness_N_per_m, s.coupling_damping_Ns_per_m, s.period_s, s.receive_window, s.mass_kg,
-        s.damping_Ns_per_m, s.spring_N_per_m, s.order, s.looks_ahead, s.horizon_s, s.gear_damping_per_s, s.damped_gears, s.orientation, s.passivity,
-        s.force_age_s, s.report_rate_Hz, s.rotational_inertia_kg_m2, s.rotational_damping_Nms_per_rad,
-        s.rotational_spring_Nm_per_rad, s.tare_s, s.tare_spread_N, s.zero_S_N, s.zero_drift_N, s.only_tares,
-        s.always_held, s.enable_timeout_s, s.enabling_timeout_s, s.wait_after_fault_s, s.without_enabling_input,
-        s.max_missed_samples, s.max_repeated_samples, s.max_missed_feedback, s.max_overruns);
+        s.damping_Ns_per_m, s.spring_N_per_m, s.order, s.looks_ahead, s.horizon_s, s.gear_damping_per_s, s.damped_gears,
+        s.orientation, s.passivity, s.force_age_s, s.report_rate_Hz, s.rotational_inertia_kg_m2,
+        s.rotational_damping_Nms_per_rad, s.rotational_spring_Nm_per_rad, s.tare_s, s.tare_spread_N, s.zero_S_N,
+        s.zero_drift_N, s.only_tares, s.always_held, s.enable_timeout_s, s.enabling_timeout_s, s.wait_after_fault_s,
+        s.without_enabling_input, s.max_missed_samples, s.max_repeated_samples, s.max_missed_feedback, s.max_overruns);
 }
 
 void archive(fieldbus::StateArchive& state, ReplayHead& head) noexcept {

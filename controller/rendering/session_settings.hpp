@@ -31,16 +31,16 @@ struct SessionSettings {
   Scheme scheme = Scheme::admittance;
   double coupling_stiffness_N_per_m = 750.0;  // impedance type: K and B of the virtual coupling
   double coupling_damping_Ns_per_m = 8.0;
-  double period_s = 1e-3;         // T, the timestep of the cycle
-  double receive_window = 0.45;   // share of T in which feedback and samples are received
-  double mass_kg = 4.0;           // what the hand feels, tool behind the sensor included
-  double damping_Ns_per_m = 0.0;  // B, virtual damping against the world at rest
-  double spring_N_per_m = 0.0;    // K_v, to the start position
-  int order = 1;                  // 1: (26); 2: with weighted forces (force_weights.hpp)
-  bool looks_ahead = false;       // the arm is sent to a predicted position of the proxy (lookahead.hpp)
-  double horizon_s = 0.0;         // H, the lookahead's horizon
-  double gear_damping_per_s = 0.0;    // κ, of gears that are damped by their torque (gear_damping.hpp); 0: none is
-  std::uint8_t damped_gears = 0;      // a bit for each joint
+  double period_s = 1e-3;           // T, the timestep of the cycle
+  double receive_window = 0.45;     // share of T in which feedback and samples are received
+  double mass_kg = 4.0;             // what the hand feels, tool behind the sensor included
+  double damping_Ns_per_m = 0.0;    // B, virtual damping against the world at rest
+  double spring_N_per_m = 0.0;      // K_v, to the start position
+  int order = 1;                    // 1: (26); 2: with weighted forces (force_weights.hpp)
+  bool looks_ahead = false;         // the arm is sent to a predicted position of the proxy (lookahead.hpp)
+  double horizon_s = 0.0;           // H, the lookahead's horizon
+  double gear_damping_per_s = 0.0;  // κ, of gears that are damped by their torque (gear_damping.hpp); 0: none is
+  std::uint8_t damped_gears = 0;    // a bit for each joint
   OrientationMode orientation = OrientationMode::held;
   Passivity passivity = Passivity::off;
   // For the passivity observer: the age of the sensor's readings on arrival, and how often the joint that reports its
