@@ -231,7 +231,7 @@ std::vector<models::JointVector> led_poses(const models::Arm& arm, const std::ve
 // The indices of the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, proxies, the
 // filter's x_f and ẋ_f, the forces that were read, and the drives' [δ, δ̇, ∫δ] and [θ̇, f].
 struct ElasticLoop::State {
-  Index n, d, ages, kept, drives, forward, torques, models;
+  Index n, d, ages, kept, drives, forward, damped, torques, models;
   [[nodiscard]] Index plant() const { return 0; }
   [[nodiscard]] Index sent() const { return 3 * n; }
   [[nodiscard]] Index proxies() const { return 5 * n; }
@@ -240,9 +240,9 @@ struct ElasticLoop::State {
   [[nodiscard]] Index drive() const { return forces() + d * ages; }
   [[nodiscard]] Index following() const { return drive() + drives; }
   [[nodiscard]] Index torque() const { return following() + forward; }
-  [[nodiscard]] Index model() const { return torque() + n * torques; }
+  [[nodiscard]] Index model() const { return torque() + damped * torques; }
   [[nodiscard]] Index band() const { return model() + d * models; }
-  [[nodiscard]] Index size() const { return models > 0 ? band() + 2 * n : band(); }
+  [[nodiscard]] Index size() const { return band() + 2 * damped; }
 };
 
 namespace {
@@ -274,12 +274,13 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopMode
       torque_ratio_(loop.gear_torque_ratio),
       torque_age_periods_((arm.torque_delay_s + loop.gear_torque_late_s) / loop.period_s),
       torque_lag_periods_(gear_torque_lag_periods(loop.drive_time_constant_s, arm.torque_delay_s, loop.period_s)) {
-  if (loop.gear_damping.damping_per_s > 0.0 && loop.gear_damping.joints != 0) {
-    yield_rad_per_Nms_ = VectorXd::Zero(joints_);
+  if (loop.gear_damping.damping_per_s > 0.0) {
+    std::vector<Index> damped;
     for (Index i = 0; i < joints_; ++i) {
-      if ((loop.gear_damping.joints & 1u << i) != 0)
-        yield_rad_per_Nms_[i] = loop.gear_damping.damping_per_s / arm.stiffness[i];
+      if ((loop.gear_damping.joints & 1u << i) != 0) damped.push_back(i);
     }
+    of_damped_ = MatrixXd::Identity(joints_, joints_)(damped, Eigen::all);
+    yields_ = loop.gear_damping.damping_per_s * arm.stiffness.cwiseInverse().asDiagonal() * of_damped_.transpose();
   }
   // A quotient of decimal numbers, hence the 1e-9. Besides the newest force: one older for the interpolation, and two
   // for Störmer's correction at order 2.
@@ -367,7 +368,9 @@ ElasticLoop::Step ElasticLoop::step_of(const ProxyMatrices& proxy, const MatrixX
 }
 
 Index ElasticLoop::size() const noexcept {
-  return State{joints_, dimensions_, ages_, proxies_, drives_, forward_, kept_torques(), kept_models()}.size();
+  return State{joints_,  dimensions_,       ages_,          proxies_,     drives_,
+               forward_, of_damped_.rows(), kept_torques(), kept_models()}
+      .size();
 }
 
 Index ElasticLoop::plant_size() const noexcept { return 5 * joints_ + drives_ + (feeds_forward_ ? 3 * joints_ : 0); }
@@ -375,7 +378,7 @@ Index ElasticLoop::plant_size() const noexcept { return 5 * joints_ + drives_ + 
 // One period, from just before one reading of the sensor to just before the next.
 void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& next) const {
   const Index n = joints_, d = dimensions_;
-  const State at{n, d, ages_, proxies_, drives_, forward_, kept_torques(), kept_models()};
+  const State at{n, d, ages_, proxies_, drives_, forward_, of_damped_.rows(), kept_torques(), kept_models()};
   const double T = period_s_;
   const auto old_sent = state.segment(at.sent() + n, n), last_sent = state.segment(at.sent(), n);
 
@@ -443,10 +446,11 @@ Index ElasticLoop::kept_models() const noexcept { return damps() ? Age(torque_la
 // asks of the gears.
 void ElasticLoop::damp(const VectorXd& state, const VectorXd& torque_now, const VectorXd& carried,
                        const Place& acceleration, VectorXd& next) const {
-  const Index n = joints_, d = dimensions_, torques = kept_torques(), models = kept_models();
-  const State at{n, d, ages_, proxies_, drives_, forward_, torques, models};
+  const Index n = of_damped_.rows(), d = dimensions_, torques = kept_torques(), models = kept_models();
+  const State at{joints_, d, ages_, proxies_, drives_, forward_, n, torques, models};
+  const VectorXd now = of_damped_ * torque_now;
   const auto torque = [&](Index age) -> VectorXd {
-    return age == 0 ? torque_now : VectorXd(state.segment(at.torque() + n * (age - 1), n));
+    return age == 0 ? now : VectorXd(state.segment(at.torque() + n * (age - 1), n));
   };
   const auto model = [&](Index age) -> Place {
     return age == 0 ? acceleration : Place(state.segment(at.model() + d * (age - 1), d));
@@ -454,13 +458,14 @@ void ElasticLoop::damp(const VectorXd& state, const VectorXd& torque_now, const 
   const Age age(torque_age_periods_), lag(torque_lag_periods_);
   const VectorXd measured = (1.0 - age.rest) * torque(age.whole) + age.rest * torque(age.whole + 1);
   const Place modelled = (1.0 - lag.rest) * model(lag.whole) + lag.rest * model(lag.whole + 1);
-  const VectorXd beside = torque_ratio_ * measured + carried - arm_.stiffness.cwiseProduct(twist_ * modelled);
+  const VectorXd explained = carried - arm_.stiffness.cwiseProduct(twist_ * modelled);
+  const VectorXd beside = torque_ratio_ * measured + of_damped_ * explained;
   const double decay = std::exp(-gear_damping_band_rad_per_s * period_s_);
   const VectorXd slow = decay * state.segment(at.band(), n) + (1.0 - decay) * beside;
   const VectorXd sum =
       decay * state.segment(at.band() + n, n) + (1.0 - decay) / gear_damping_band_rad_per_s * (beside - slow);
-  next.segment(at.sent(), n) -= yield_rad_per_Nms_.cwiseProduct(sum);
-  next.segment(at.torque(), n) = torque_now;
+  next.segment(at.sent(), joints_) -= yields_ * sum;
+  next.segment(at.torque(), n) = now;
   next.segment(at.torque() + n, n * (torques - 1)) = state.segment(at.torque(), n * (torques - 1));
   next.segment(at.model(), d) = acceleration;
   next.segment(at.model() + d, d * (models - 1)) = state.segment(at.model(), d * (models - 1));

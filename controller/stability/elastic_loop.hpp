@@ -132,7 +132,7 @@ class ElasticLoop {
             const Place& acceleration, Eigen::VectorXd& next) const;
 
   ElasticArm arm_;
-  [[nodiscard]] bool damps() const noexcept { return yield_rad_per_Nms_.size() > 0; }
+  [[nodiscard]] bool damps() const noexcept { return of_damped_.rows() > 0; }
 
   double period_s_, damping_, spring_, horizon_s_, time_constant_s_;
   bool feeds_forward_;
@@ -145,7 +145,8 @@ class ElasticLoop {
   // Numbers of joints n, of tool dimensions, of old forces and proxies that are kept, and of the drives' states: those
   // that yield, 3 n or none, and those that feed forward, 2 n or none.
   Eigen::Index joints_, dimensions_, ages_, proxies_, drives_, forward_;
-  Eigen::VectorXd yield_rad_per_Nms_;  // κ/k of each gear that is damped by its torque; empty: none is
+  // Of gears that are damped by their torque: a row of the identity for each, and a column of κ/k; empty: none is.
+  Eigen::MatrixXd of_damped_, yields_;
   double torque_ratio_, torque_age_periods_, torque_lag_periods_;  // of gears that are damped by their torque
 };
 

@@ -119,7 +119,8 @@ inline constexpr double auto_share = 0.85, heavy_hand = 1.9;
 double stable_horizon_s(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
 
 // What a loop that damps its gears by their torque has to hold with, each alone: torques that are measured a fifth too
-// small; a fifth too large and so much later than is said; gears as soft as gear_margins says.
+// large and so much later than is said; gears as soft as gear_margins says. (Torques that are a fifth too small ask for
+// less than those.)
 inline constexpr double torque_margin = 0.2, late_torque_s = 0.002;
 // The κ of gear damping that a session takes, of the joints that `loop` names: that of these with which the smallest
 // mass is stable. The gears themselves have to come to rest with it, under a proxy so heavy that the hand doesn't
