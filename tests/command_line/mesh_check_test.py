@@ -128,6 +128,16 @@ class Meshes(ProgramTest):
         self.assertIn("no verdict", outcome.err)
         self.assertIn("NO VERDICT in 500 states, 0 in contact", outcome.out)
 
+    def test_the_summary_counts_steps_of_a_point_that_keep_not_all_laws(self):
+        # Only a rigid tool's were. The inside of a funnel of 100 planes has more of them near than a step tries.
+        planes = []
+        for k in range(100):
+            a = 2 * math.pi * k / 100
+            planes.append("  - plane: {point_m: [0.75, 0, 0.6], normal: [%.15g, %.15g, %.15g], friction: 0.3}\n"
+                          % (-0.7, 0.7 * math.cos(a), 0.7 * math.sin(a)))
+        summary = self.summary("--scene", self.written("funnel.yaml", "objects:\n" + "".join(planes)), "--duration", "4s")
+        self.assertGreater(summary["unresolved_steps"], 0)
+
     def test_a_mesh_is_placed_by_its_box(self):
         part = [tuple((x + 3, y - 2, z + 1) for x, y, z in t) for t in globe(24, 36, lambda t, p: 0.1)]
         low = self.scene("low", part, "position_m: [0.9, 0, 0.6], anchor: low")
