@@ -2,6 +2,9 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <string>
+#include <variant>
+#include <vector>
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/entry/exit_status.hpp"
@@ -43,7 +46,9 @@ void tell(const std::vector<std::string>& lines) {
 }
 
 // Assumption 1 and the laws of each object and the whole, with the worst figures. What the scene is; null if it is
-// wrong.
+// wrong; kUntouched without a verdict.
+const char* const kUntouched = "nothing was touched";
+
 const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& options) {
   auto worst = scenes::CheckVerdict::fine;
   for (const scenes::CheckReport& report : scenes::check_scene(scene, options)) {
@@ -55,6 +60,8 @@ const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& o
       return "scene";
     case scenes::CheckVerdict::several_solutions:
       return "scene, with several solutions";
+    case scenes::CheckVerdict::untouched:
+      return kUntouched;
     case scenes::CheckVerdict::wrong:
       break;
   }
@@ -64,6 +71,19 @@ const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& o
 void tell_joined(const scenes::Scene& scene) {
   const scenes::Plan plan = scenes::compile(scene).plan;
   if (!plan.joined.empty()) std::printf("stand flush, and hold as one: %s\n", joined_text(scene, plan).c_str());
+}
+
+// What became of each mesh's faces, and where it lies.
+void tell_meshes(const scenes::Scene& scene) {
+  for (const scenes::Object& object : scene.objects) {
+    const auto* const shape = std::get_if<scenes::MeshShape>(&object.shape);
+    if (shape == nullptr || !shape->mesh) continue;
+    std::printf("%s: %s; %s\n", object.name.c_str(), shape->account.text().c_str(),
+                scenes::box_text(*shape->mesh).c_str());
+    for (const std::string& line : scenes::unit_hints(*shape->mesh, shape->scale_m)) {
+      std::printf("%s: %s\n", object.name.c_str(), line.c_str());
+    }
+  }
 }
 
 // The laws are those of a point's 𝒢. With a tool, what it can't be rendered in is refused beside that.
@@ -78,6 +98,7 @@ const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOpti
   const double anywhere_m = std::numeric_limits<double>::infinity();
   tell(controller::scene_doubts(scene, models::Vec3::Zero(), anywhere_m));
   if (!scene.tool) tell_joined(scene);
+  tell_meshes(scene);
   return check_laws(scene, options);
 }
 
@@ -182,7 +203,11 @@ int check_command(const CheckFilesOptions& options) {
   for (const fs::path& given : options.files) {
     try {
       const char* kind = check(user_file(given), options);
-      if (kind != nullptr) {
+      if (kind == kUntouched) {
+        std::fprintf(stderr, "proxarm: %s: no verdict: no state touched anything; push deeper with --depth\n",
+                     given.c_str());
+        status = set_up_mistake;
+      } else if (kind != nullptr) {
         std::printf("%s: fine, %s %s\n", given.c_str(), *kind == 'a' ? "an" : "a", kind);
       } else {
         std::fprintf(stderr,

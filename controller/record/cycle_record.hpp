@@ -50,7 +50,7 @@ enum class RecordFlag : std::uint32_t {
   slowed = 1u << 25,   // the tool's speed limit is below the cell's, because of a fault
   oscillation_lasts = 1u << 26,
   power_cut = 1u << 27,    // the drives are told to lose their power at once: a stop of category 0
-  unresolved = 1u << 28,   // of a rigid tool: no solution was found that keeps all laws of contact
+  unresolved = 1u << 28,   // no solution was found that keeps all laws of contact
   sample_late = 1u << 29,  // the sensor's sample is one that the cycle before had waited for
 };
 

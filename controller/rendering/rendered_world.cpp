@@ -118,6 +118,7 @@ class WorldOfDimension final : public RenderedWorld {
     if (anchor_.step(proxy_.config().period_s)) proxy_.set_reference(anchor_.at());
     limited_.set_limits(limits, space_.basis(), proxy_.q());
     if (unsettled_ && settle()) return last_;
+    const std::uint64_t unresolved = scene_->template algorithm<N>().unresolved_steps();
     ProxyFault fault = proxy_.step(space_.basis().transpose() * h_W);
     if (fault == ProxyFault::none && limited_.squeezed()) fault = ProxyFault::squeezed;
     if (fault != ProxyFault::none) {
@@ -125,6 +126,7 @@ class WorldOfDimension final : public RenderedWorld {
       return last_;
     }
     take_last();
+    last_.unresolved = scene_->template algorithm<N>().unresolved_steps() != unresolved;
     return last_;
   }
 

@@ -38,7 +38,7 @@ struct WorldStep {
   // Those of them that are told; of a point without place and force. The world's own: they last until its next step.
   std::span<const models::PoseContact> touches;
   bool slips = false;
-  bool unresolved = false;                             // of a rigid tool (pose_algorithm.hpp)
+  bool unresolved = false;                             // 𝒢 found no solution that keeps all laws of contact
   ActiveLimits limits;                                 // that held the proxy back
   bool soft_limits_met = true;                         // whether leash and power were satisfied
   models::Vec3 limit_force_W = models::Vec3::Zero();   // the limits' force on the proxy; not in f_W

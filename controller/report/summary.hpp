@@ -200,7 +200,7 @@ struct Summary {
   // What limits have put into the proxy, and the most without taking it back; negative: they took it.
   double limits_work_J = 0.0, limits_push_J = 0.0;
   std::uint64_t held_samples = 0;         // cycles without a new sample of the sensor
-  std::size_t unresolved_steps = 0;       // of a rigid tool: steps of 𝒢 that keep not all laws
+  std::size_t unresolved_steps = 0;       // steps of 𝒢 that keep not all laws
   EndSummary end;                         // set by the caller
   std::vector<OrderSummary> idle_orders;  // set by the caller
   std::vector<std::string> drives_lack;   // what drives haven't got, and what is lost by it; set by the caller

@@ -29,6 +29,9 @@ struct Contact {
   std::int32_t feature = 0;  // face, edge or region within the object
   bool slips = false;        // false: the proxy sticks there, or there is no friction
   Vec<N> normal = Vec<N>::Zero();  // unit, out of the object
+  // Of one that sticks: within this step the proxy slid over other faces to where it is held. v in (17) is 0 there, not
+  // N Nᵀ (r − q)/T; where it is held may depend on K.
+  bool reached = false;
 };
 
 // What a step may know besides K, p and q. Only laws that contain time, and objects that move, need it.

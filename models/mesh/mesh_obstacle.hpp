@@ -47,7 +47,7 @@ class MeshObstacle final : public Obstacle {
     if (surface_.contacts().empty()) return Obstacle::contacts(K, p, q, s, out);
     std::size_t count = 0;
     for (const Contact<3>& contact : surface_.contacts()) {
-      out[count++] = {0, feature_of(contact), contact.slips, contact.normal};
+      out[count++] = {0, feature_of(contact), contact.slips, contact.normal, contact.reached};
     }
     return count;
   }

@@ -101,27 +101,60 @@ void note(MeshDefect& defect, const Vec3& at_W) {
   if (defect.count++ == 0) defect.first_W = at_W;
 }
 
-// Loops of the edges that have one face. Each is walked against its face's direction, as what closes it would go.
-std::vector<std::vector<std::uint32_t>> loops_of(std::vector<std::pair<std::uint32_t, std::uint32_t>> open) {
+struct Outlines {
+  std::vector<std::vector<std::uint32_t>> loops;   // the last vertex is followed by the first
+  std::vector<std::vector<std::uint32_t>> chains;  // from the first vertex to the last
+};
+
+// Outlines of the edges that have one face. Each is walked against its face's direction, as what closes it would go.
+// Chains are taken first, from vertices where more edges begin than end. Then as many begin as end everywhere, and each
+// walk comes back to where it began (Euler). A chain ends where outlines meet.
+Outlines outlines_of(std::vector<std::pair<std::uint32_t, std::uint32_t>> open, std::size_t vertices) {
   std::sort(open.begin(), open.end());
   std::vector<bool> used(open.size(), false);
+  std::vector<std::int32_t> more_begin(vertices, 0), ends(vertices, 0);
+  std::vector<std::size_t> next(vertices, open.size());  // the first edge from a vertex that may be unused
+  for (std::size_t k = open.size(); k-- > 0;) {
+    const auto [from, to] = open[k];
+    next[from] = k;
+    ++ends[from];
+    ++ends[to];
+    ++more_begin[from];
+    --more_begin[to];
+  }
   const auto next_from = [&](std::uint32_t vertex) {
-    auto at = std::lower_bound(open.begin(), open.end(), std::pair(vertex, 0u));
-    while (at != open.end() && at->first == vertex && used[static_cast<std::size_t>(at - open.begin())]) ++at;
-    return at != open.end() && at->first == vertex ? static_cast<std::size_t>(at - open.begin()) : open.size();
+    std::size_t& at = next[vertex];
+    while (at < open.size() && open[at].first == vertex && used[at]) ++at;
+    return at < open.size() && open[at].first == vertex ? at : open.size();
   };
-  std::vector<std::vector<std::uint32_t>> loops;
+  Outlines found;
+  const auto take = [&](std::vector<std::uint32_t> chain) {
+    const bool loop = chain.front() == chain.back();
+    if (loop) chain.pop_back();
+    if (!chain.empty()) (loop ? found.loops : found.chains).push_back(std::move(chain));
+  };
+  const auto walk_chain = [&](std::uint32_t from) {
+    std::vector<std::uint32_t> chain{from};
+    for (std::size_t at = next_from(from); at < open.size(); at = next_from(open[at].second)) {
+      used[at] = true;
+      chain.push_back(open[at].second);
+      if (ends[chain.back()] > 2) take(std::exchange(chain, {open[at].second}));
+    }
+    take(std::move(chain));
+  };
+  for (std::uint32_t vertex = 0; vertex < vertices; ++vertex) {
+    for (std::int32_t k = 0; k < more_begin[vertex]; ++k) walk_chain(vertex);
+  }
   for (std::size_t first = 0; first < open.size(); ++first) {
     if (used[first]) continue;
-    std::vector<std::uint32_t> loop;
+    std::vector<std::uint32_t>& loop = found.loops.emplace_back();
     for (std::size_t at = first; at < open.size(); at = next_from(open[at].second)) {
       used[at] = true;
       loop.push_back(open[at].first);
       if (open[at].second == open[first].first) break;
     }
-    loops.push_back(std::move(loop));
   }
-  return loops;
+  return found;
 }
 
 // Longer outlines aren't holes that anybody wants closed; their area is that of Newell's normal, and costs nothing.
@@ -192,6 +225,15 @@ MeshHole hole_of(const TriangleMesh& mesh, std::vector<std::uint32_t> loop) {
   return hole;
 }
 
+MeshBorder border_of(const TriangleMesh& mesh, const std::vector<std::uint32_t>& chain) {
+  MeshBorder border{chain.size() - 1, 0.0, Vec3::Zero()};
+  for (std::size_t k = 0; k < chain.size(); ++k) {
+    border.centre += mesh.vertex(chain[k]) / static_cast<double>(chain.size());
+    if (k > 0) border.length_m += (mesh.vertex(chain[k]) - mesh.vertex(chain[k - 1])).norm();
+  }
+  return border;
+}
+
 // Faces that are turned against most of their part, and parts that are closed and inside out.
 void judge_sides(const TriangleMesh& mesh, Parts& parts, const std::vector<bool>& open_part, MeshTopology& found) {
   struct Part {
@@ -239,10 +281,13 @@ MeshTopology topology_of(const TriangleMesh& mesh) {
       note(found.non_manifold, 0.5 * (mesh.vertex(first->low) + mesh.vertex(first->high)));
     }
   });
-  auto loops = loops_of(std::move(open));
-  for (auto& loop : loops) found.holes.push_back(hole_of(mesh, std::move(loop)));
+  Outlines outlines = outlines_of(std::move(open), mesh.structure().vertices.size());
+  for (auto& loop : outlines.loops) found.holes.push_back(hole_of(mesh, std::move(loop)));
+  for (const auto& chain : outlines.chains) found.borders.push_back(border_of(mesh, chain));
   std::sort(found.holes.begin(), found.holes.end(),
             [](const MeshHole& a, const MeshHole& b) { return a.size_m < b.size_m; });
+  std::sort(found.borders.begin(), found.borders.end(),
+            [](const MeshBorder& a, const MeshBorder& b) { return a.length_m < b.length_m; });
   std::vector<bool> open_part(mesh.size(), false);
   for (const std::uint32_t face : open_faces) open_part[parts.root(face).face] = true;
   judge_sides(mesh, parts, open_part, found);

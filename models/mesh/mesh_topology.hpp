@@ -15,7 +15,7 @@
 
 namespace proxarm::models {
 
-// An outline of the mesh: a loop of edges that have a face on one side only.
+// A closed outline of the mesh: a loop of edges that have a face on one side only.
 struct MeshHole {
   std::vector<std::uint32_t> loop;  // vertices, in turn
   Vec3 centre = Vec3::Zero();       // the mean of them, in W
@@ -24,13 +24,22 @@ struct MeshHole {
   double size_m = 0.0;
 };
 
+// Edges with a face on one side only that don't come back to where they begin: they end at an edge of three and more
+// faces, or where fronts change.
+struct MeshBorder {
+  std::size_t edges = 0;
+  double length_m = 0.0;
+  Vec3 centre = Vec3::Zero();  // the mean of its vertices, in W
+};
+
 struct MeshTopology {
-  std::size_t parts = 0;        // faces that share an edge are of one part
-  std::vector<MeshHole> holes;  // the smallest first
-  MeshDefect non_manifold;      // edges of three and more faces
-  MeshDefect flipped;           // faces seen from behind where most of their part is seen from the front
-  std::size_t one_sided = 0;    // parts of which nobody can say which side is the front, such as a Möbius strip
-  std::size_t inside_out = 0;   // closed parts whose fronts are inside
+  std::size_t parts = 0;            // faces that share an edge are of one part
+  std::vector<MeshHole> holes;      // the smallest first
+  std::vector<MeshBorder> borders;  // the shortest first
+  MeshDefect non_manifold;          // edges of three and more faces
+  MeshDefect flipped;               // faces seen from behind where most of their part is seen from the front
+  std::size_t one_sided = 0;        // parts of which nobody can say which side is the front, such as a Möbius strip
+  std::size_t inside_out = 0;       // closed parts whose fronts are inside
 };
 MeshTopology topology_of(const TriangleMesh& mesh);
 

@@ -355,7 +355,7 @@ void MeshSurface::Walk::report(std::size_t contacts, const std::array<std::size_
   s.count_ = contacts;
   for (std::size_t k = 0; k < contacts; ++k) {
     const Side& side = touched[of[k]];
-    s.contacts_[k] = {0, static_cast<std::int32_t>(side.face), slips[k], side.normal};
+    s.contacts_[k] = {0, static_cast<std::int32_t>(side.face), slips[k], side.normal, false};
   }
 }
 
@@ -367,10 +367,15 @@ bool MeshSurface::Walk::can_support(std::size_t contacts, const std::array<std::
   return in_sum_of_cones(c - p, {cones.data(), contacts}, lift + 8.0 * u * p.lpNorm<1>());
 }
 
-// The fallback where no set of faces lets the proxy move: it is held where it is, as by a vertex. At most three faces
-// that can bear the force are reported.
+// The fallback where no set of faces lets the proxy move: it is held where it is, as by a vertex.
 void MeshSurface::Walk::hold() noexcept {
   if (c != q && (c - q).norm() <= kAround * lift) c = q;  // a move this small is only that of leave_planes()
+  report_holding();
+  for (std::size_t k = 0; k < s.count_; ++k) s.contacts_[k].reached = c != q;
+}
+
+// At most three faces that can bear the force.
+void MeshSurface::Walk::report_holding() noexcept {
   const std::size_t n = std::min(count, std::size_t{16});
   constexpr std::array<bool, 3> at_rest{false, false, false};
   for (std::size_t i = 0; i < n; ++i) {

@@ -53,6 +53,7 @@ struct MeshSurface::Walk {
   StepResult try_pair(std::size_t i, std::size_t j) noexcept;
   StepResult try_triple(const std::array<std::size_t, 3>& of) noexcept;
   void hold() noexcept;
+  void report_holding() noexcept;
   [[nodiscard]] bool can_support(std::size_t count, const std::array<std::size_t, 3>& of) const noexcept;
   void report(std::size_t count, const std::array<std::size_t, 3>& of, const std::array<bool, 3>& slips) noexcept;
 

@@ -89,6 +89,7 @@ std::unique_ptr<PoseAlgorithm> RigidWorld::clone() const { return std::make_uniq
 void RigidWorld::copy_state(const PoseAlgorithm& other) noexcept { *this = dynamic_cast<const RigidWorld&>(other); }
 
 RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
+  if (tool.parts.empty()) throw std::invalid_argument("a rigid tool needs a part; a point is rendered by a World");
   auto shared = std::make_shared<Shared>();
   shared->thinness = std::numeric_limits<double>::infinity();
   for (const ToolPart& part : tool.parts) {
@@ -104,12 +105,6 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     const Bounds box = bounds_of(solid, 0.0);
     const std::optional<Cylinder> cylinder = cylinder_in(solid);
     shared->parts.push_back({std::move(solid), box, part.friction, std::move(mesh), cylinder});
-  }
-  if (tool.parts.empty()) {
-    Solid point;
-    point.points = {Vec3::Zero()};
-    const Bounds box = bounds_of(point, 0.0);
-    shared->parts.push_back({std::move(point), box, {}});
   }
   std::vector<RigidObject> still_first;
   for (RigidObject& object : objects) {

@@ -45,10 +45,10 @@ namespace proxarm::models {
 
 class RigidWorld final : public PoseAlgorithm {
  public:
-  // Throws std::invalid_argument for a tool's shape without a size, points that span no solid, a mesh that is open, a
-  // friction below 0, a cylinder as an object, and one as a tool beside solids, meshes or a tube with round ends. A
-  // tool without parts is a point: a sphere of no radius. An open mesh, which compile_rigid() refuses, is held from
-  // both sides, but what is sharp may pass its border by micrometres.
+  // Throws std::invalid_argument for a tool without parts (a point is rendered by a World), a tool's shape without a
+  // size, points that span no solid, a mesh that is open, a friction below 0, a cylinder as an object, and one as a
+  // tool beside solids, meshes or a tube with round ends. An open mesh as an object, which compile_rigid() refuses, is
+  // held from both sides, but what is sharp may pass its border by micrometres.
   RigidWorld(const Tool& tool, std::vector<RigidObject> objects);
 
   const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;

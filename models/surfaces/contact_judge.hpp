@@ -34,13 +34,14 @@ double rounding_amplification(std::span<const Contact<N>> contacts) {
 
 // How far the proxy slid along contacts that are reported to stick, metres. (17) lets such a contact bear any force of
 // its cone because N Nᵀ (r − q) = 0 there. So a wall that creeps isn't detected by its forces, but by this distance.
-// Contacts without friction, or with unknown friction, are left out. Arguments as below.
+// Contacts without friction, or with unknown friction, are left out, and so are those that the proxy slid to over other
+// faces (Contact::reached). Arguments as below.
 template <int N, typename Friction, typename Motion>
 double creep_m(std::span<const Contact<N>> contacts, Friction friction, Motion motion) {
   double most = 0.0;
   for (const Contact<N>& contact : contacts) {
     const std::optional<double> mu = friction(contact);
-    if (contact.slips || !mu || !(*mu > 0.0)) continue;
+    if (contact.slips || contact.reached || !mu || !(*mu > 0.0)) continue;
     const Vec3 n = lift<N>(contact.normal), moved = motion(contact);
     most = std::max(most, (moved - n * n.dot(moved)).norm());
   }

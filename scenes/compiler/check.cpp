@@ -1,6 +1,7 @@
 #include "scenes/compiler/check.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -101,7 +102,16 @@ class Checker {
   }
 
   CheckReport run() {
-    for (std::int64_t i = 0; i < options_.states; ++i) one();
+    using Clock = std::chrono::steady_clock;
+    const Clock::time_point begin = Clock::now();
+    const double most_s = options_.most_s_per_state * static_cast<double>(options_.states);
+    report_.asked = options_.states;
+    report_.expects_contact = region_.touches;
+    const auto is_late = [&] {
+      report_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+      return report_.seconds > most_s;
+    };
+    for (std::int64_t i = 0; i < options_.states && !is_late(); ++i) one();
     return report_;
   }
 
@@ -168,6 +178,12 @@ class Checker {
     if (!(error <= 1.0) && other.unresolved) {
       return count(report_.unresolved, report_.unresolved_state, s, more);
     }
+    const auto reached = [](const models::Contact<N>& contact) { return contact.reached; };
+    if (!(error <= 1.0) && other.r.allFinite() && lawful &&
+        (std::any_of(s.contacts.begin(), s.contacts.end(), reached) ||
+         std::any_of(other.contacts.begin(), other.contacts.end(), reached))) {
+      return count(report_.ways, report_.ways_state, s, more);
+    }
     if (!(error <= 1.0) && other.r.allFinite() && lawful) {
       return count(report_.several, report_.several_state, s, more);
     }
@@ -188,11 +204,12 @@ Vec3 onto(const Space& space, const Vec3& x_W) {
   return space.origin_m + axes * (axes.transpose() * (x_W - space.origin_m));
 }
 
-// Points of the proxy's space just outside of an object's surface, found by Newton steps along the gradient of the
-// distance.
-std::vector<Vec3> around(const Object& object, const Space& space, Random& random, int count) {
+// Points of the proxy's space just outside of an object's surface, near enough for states to push onto it, found by
+// Newton steps along the gradient of the distance.
+std::vector<Vec3> around(const Object& object, const Space& space, Random& random, int count, double deepest_m) {
   const Vec3 middle = middle_of(object.shape);
   const double size = size_of(object.shape);
+  const double off = std::min(1e-3 * size, 0.25 * deepest_m);
   std::vector<Vec3> places;
   for (int i = 0; i < count; ++i) {
     Vec3 x = onto(space, middle + random.in_box<3>(1.2 * size));
@@ -204,8 +221,8 @@ std::vector<Vec3> around(const Object& object, const Space& space, Random& rando
         slope += (distance_to(object, x + h * axis) - d) / h * axis;
       }
       // Within a space that cuts the object, the gradient is shorter than one.
-      x -= (d - 1e-3 * size) / (space.dimensions == 3 ? 1.0 : std::max(slope.squaredNorm(), 0.1)) * slope;
-      if (std::abs(d - 1e-3 * size) < 1e-4 * size) break;
+      x -= (d - off) / (space.dimensions == 3 ? 1.0 : std::max(slope.squaredNorm(), 0.1)) * slope;
+      if (std::abs(d - off) < 0.1 * off) break;
     }
     places.push_back(x);
   }
@@ -260,6 +277,7 @@ CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, con
   // Contacts don't say which friction region of a mesh they are on, so their friction counts as unknown.
   const auto has_regions = [](const Object& object) { return !object.friction_regions.empty(); };
   if (std::any_of(scene.objects.begin(), scene.objects.end(), has_regions)) region.friction.reset();
+  region.touches = !scene.objects.empty() && !scene.guide;
   region.has_coulomb_medium = std::any_of(scene.media.begin(), scene.media.end(),
                                           [](const MediumDescription& medium) { return medium.force_N > 0.0; });
   region.acts_without_contact = region.has_coulomb_medium || scene.coulomb_force_N || scene.guide;
@@ -304,7 +322,8 @@ CheckVerdict CheckReport::verdict() const noexcept {
   if (std::any_of(figures.begin(), figures.end(), failed) || static_cast<double>(unresolved) > allowed) {
     return CheckVerdict::wrong;
   }
-  return static_cast<double>(several) > allowed ? CheckVerdict::several_solutions : CheckVerdict::fine;
+  if (expects_contact && in_contact == 0) return CheckVerdict::untouched;
+  return static_cast<double>(several + ways) > allowed ? CheckVerdict::several_solutions : CheckVerdict::fine;
 }
 
 std::string CheckReport::text() const {
@@ -314,11 +333,29 @@ std::string CheckReport::text() const {
   const auto percent = [this](std::int64_t count) {
     return 100.0 * static_cast<double>(count) / static_cast<double>(states);
   };
-  out << subject << ": " << (verdict() == CheckVerdict::wrong ? "WRONG" : "fine") << " in " << states << " states, "
-      << in_contact << " in contact, " << slipping << " slipping contacts";
+  const CheckVerdict is = verdict();
+  const char* const word = is == CheckVerdict::wrong ? "WRONG" : is == CheckVerdict::untouched ? "NO VERDICT" : "fine";
+  out << subject << ": " << word << " in " << states << " states, " << in_contact << " in contact, " << slipping
+      << " slipping contacts";
   if (several > 0) out << ", " << several << " where there are several solutions";
+  if (ways > 0) out << ", " << ways << " where the way over the mesh depends on K";
   if (unresolved > 0) out << ", " << unresolved << " without an answer";
   out << "\n";
+  if (is == CheckVerdict::untouched) {
+    out << "  nothing was touched: push deeper (--depth), or move the object to where it is free\n";
+  }
+  if (states < asked) {
+    out << "  stopped after " << seconds << " s, of " << asked
+        << " states: " << 1e3 * seconds / static_cast<double>(states)
+        << " ms each, as where hundreds of faces or objects lie on one another; a session would miss its period "
+           "there\n";
+  }
+  if (ways > 0) {
+    out << "  the way over the mesh depends on K in " << percent(ways)
+        << " % of the states: the proxy slides over some faces and is held by others, and where it is held depends on "
+           "the way (shorter steps: less); the first at "
+        << ways_state << "\n";
+  }
   if (static_cast<double>(several) > allowed) {
     out << "  several solutions in " << percent(several)
         << " % of the states, where friction leaves open which one it is (more friction, sharper corners: more): a "
@@ -378,7 +415,8 @@ std::vector<CheckReport> check_scene(const Scene& scene, const CheckOptions& giv
   Random random(options.seed);
   std::vector<Vec3> all;
   for (const Object& object : scene.objects) {
-    const std::vector<Vec3> places = around(object, scene.space, random, scene.objects.size() > 100 ? 4 : 200);
+    const std::vector<Vec3> places =
+        around(object, scene.space, random, scene.objects.size() > 100 ? 4 : 200, options.deepest_m);
     all.insert(all.end(), places.begin(), places.end());
     if (scene.objects.size() < 2 || scene.objects.size() > 100) continue;
     Scene alone = scene;

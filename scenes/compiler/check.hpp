@@ -29,7 +29,8 @@ struct CheckOptions {
   // Largest depth of p below q, for any κ. check_scene() limits it to a tenth of the least radius: deeper, curved
   // worlds have several solutions.
   double deepest_m = 0.02;
-  double several_allowed = 0.02;  // from this share of the states on several solutions, or no answer, are a verdict
+  double most_s_per_state = 250e-6;  // on average, in real time; where states take longer, fewer are tried
+  double several_allowed = 0.02;     // from this share of the states on several solutions, or no answer, are a verdict
 };
 
 // Where states are sampled, and what is known of the world there.
@@ -46,8 +47,9 @@ struct CheckRegion {
   // samples at 4 % of the way to p and less (models/surfaces/coulomb_step.hpp), which amplifies rounding by the inverse
   // of that share.
   bool has_coulomb_medium = false;
-  bool bends = false;  // there is a chain of pieces: near a corner, a place on the other piece may be a solution too
-  bool soft = false;   // there is an elastic layer: nothing rests within it without a force
+  bool bends = false;    // there is a chain of pieces: near a corner, a place on the other piece may be a solution too
+  bool touches = false;  // there are objects that states begin at: without a contact there is no verdict
+  bool soft = false;     // there is an elastic layer: nothing rests within it without a force
 };
 
 struct CheckFigure {
@@ -58,15 +60,20 @@ struct CheckFigure {
 };
 
 // Several solutions are no mistake: Coulomb's law leaves open which it is, and the one that is found may depend on K.
-enum class CheckVerdict : std::uint8_t { fine, several_solutions, wrong };
+// Neither is it that the way over a mesh's faces ends elsewhere with another K, though Assumption 1 doesn't hold there.
+enum class CheckVerdict : std::uint8_t { fine, several_solutions, untouched, wrong };
 
 struct CheckReport {
   std::string subject;
   std::int64_t states = 0, in_contact = 0, slipping = 0;
-  std::int64_t several = 0;                     // states with several solutions
-  std::int64_t unresolved = 0;                  // states in which no answer was found that keeps all laws
-  std::string several_state, unresolved_state;  // the first of each
-  double several_allowed = 0.0;                 // largest share of either among all states
+  std::int64_t asked = 0;        // states that were asked for; fewer were tried if states < asked
+  double seconds = 0.0;          // that it took
+  bool expects_contact = false;  // without a contact there is no verdict
+  std::int64_t several = 0;      // states with several solutions
+  std::int64_t ways = 0;         // states whose way over a mesh's faces depends on K
+  std::int64_t unresolved = 0;   // states in which no answer was found that keeps all laws
+  std::string several_state, ways_state, unresolved_state;  // the first of each
+  double several_allowed = 0.0;                             // largest share of each among all states
   std::vector<CheckFigure> figures;
 
   [[nodiscard]] CheckVerdict verdict() const noexcept;

@@ -66,8 +66,9 @@ struct CylinderShape {
 // proxy, so a closed mesh is a body for a proxy outside and a cavity for a proxy inside.
 struct MeshShape {
   std::filesystem::path file;
-  double scale_m = 1.0;  // metres per unit of the file
-  models::Pose pose_W = models::Pose::Identity();
+  double scale_m = 1.0;                              // metres per unit of the file
+  models::Pose pose_W = models::Pose::Identity();    // as described: of the file's origin, or of what `anchor` names
+  std::optional<double> weld_m;                      // MeshPlacement::weld_m
   double close_holes_m = 0.0;                        // holes up to this size are closed; 0: none
   bool inside_out = false;                           // of a closed mesh: the inside is the free side
   std::shared_ptr<const models::TriangleMesh> mesh;  // in W

@@ -26,6 +26,8 @@ constexpr description::Range coordinate_range = between(-1e5, 1e5);
 constexpr description::Range friction_range = between(0.0, 100.0);
 // A length below a nanometre is a mistake of the unit; an arm knows its position to micrometres.
 constexpr description::Range length_range = between(1e-9, 1e5);
+// Corners ten centimetres apart are never one.
+constexpr description::Range weld_range = between(0.0, 0.1);
 constexpr description::Range speed_range = between(-100.0, 100.0);
 
 Vec3 vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
@@ -55,14 +57,23 @@ models::Pose pose_of(const YamlNode& node) {
   return pose;
 }
 
+MeshPlacement placement_of(const YamlNode& node, const MeshShape& mesh) {
+  MeshPlacement placement{mesh.scale_m, mesh.pose_W, {}, mesh.weld_m, mesh.close_holes_m};
+  const std::string anchor = node.choice_or("anchor", "origin", {"low", "centre", "origin"});
+  if (anchor == "low") placement.anchor = MeshPlacement::Anchor::low;
+  if (anchor == "centre") placement.anchor = MeshPlacement::Anchor::centre;
+  return placement;
+}
+
 MeshShape read_mesh(const YamlNode& node) {
   MeshShape mesh;
   mesh.file = node.existing_file("file");
   mesh.scale_m = node.number_or("scale_m", 1.0, between(1e-6, 1e6));
   mesh.pose_W = pose_of(node);
   mesh.inside_out = node.boolean_or("inside_out", false);
+  if (node.has("weld_m")) mesh.weld_m = node.number("weld_m", weld_range);
   mesh.close_holes_m = node.number_or("close_holes_m", 0.0, between(0.0, 1e3));
-  LoadedMesh loaded = load_mesh(mesh.file, {mesh.scale_m, mesh.pose_W, mesh.close_holes_m});
+  LoadedMesh loaded = load_mesh(mesh.file, placement_of(node, mesh));
   mesh.mesh = std::move(loaded.mesh);
   mesh.account = loaded.account;
   if (mesh.inside_out && !mesh.mesh->closed()) {

@@ -24,6 +24,7 @@ using models::Vec3;
 // A tool of more than ten metres is a mistake of the unit, and so is one below a micrometre.
 constexpr description::Range size_range = between(1e-6, 10.0);
 constexpr description::Range friction_range = between(0.0, 100.0);
+constexpr description::Range weld_range = between(0.0, 0.1);
 constexpr std::size_t most_parts = 64, most_vertices = 2000, most_triangles = 20000;
 
 Vec3 vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
@@ -95,6 +96,7 @@ models::MeshTool read_mesh(const YamlNode& node, RigidTool& tool) {
   const std::filesystem::path file = node.existing_file("file");
   MeshPlacement placement;
   placement.scale = node.number_or("scale_m", 1.0, between(1e-6, 1e6));
+  if (node.has("weld_m")) placement.weld_m = node.number("weld_m", weld_range);
   placement.close_holes_m = node.number_or("close_holes_m", 0.0, between(0.0, 1e3));
   const auto [mesh, account] = load_mesh(file, placement);
   if (const models::NoInside found = models::why_no_inside(*mesh, account.closing); !found.what.empty()) {

@@ -2,6 +2,8 @@
 
 #include <cstdio>
 
+#include "models/mesh/mesh_topology.hpp"
+
 namespace proxarm::scenes {
 namespace {
 
@@ -26,6 +28,13 @@ std::string FaceAccount::text() const {
   add(text, unused_vertices, "%llu vertices that no face uses");
   add(text, points_and_lines, "%llu points and lines left out");
   add(text, bytes_behind, "%llu bytes behind the last face left out");
+  add(text, repeated, "%llu faces left out that are there already");
+  add(text, double_sided, "%llu faces left out that are there already with the opposite front (double-sided)");
+  if (welded > 0) {
+    text += ", " + std::to_string(welded) + (welded == 1 ? " corner" : " corners") + " welded within " +
+            models::size_text(welded_within_m) + ", moved by " + models::size_text(welded_apart_m) + " at most";
+  }
+  add(text, collapsed, "%llu triangles left out that were smaller than that");
   add(text, closing, "%llu triangles added over holes");
   return text;
 }

@@ -1,6 +1,7 @@
 #include "scenes/mesh_files/mesh_builder.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <stdexcept>
 
@@ -9,6 +10,7 @@
 
 namespace proxarm::scenes {
 
+using models::TriangleSoup;
 using models::Vec3;
 
 void MeshBuilder::reserve(std::size_t vertices, std::size_t faces) {
@@ -19,6 +21,21 @@ void MeshBuilder::reserve(std::size_t vertices, std::size_t faces) {
 bool MeshBuilder::add_vertex(double x, double y, double z) {
   mesh_.soup.vertices.emplace_back(x, y, z);
   return std::isfinite(x) && std::isfinite(y) && std::isfinite(z);
+}
+
+void MeshBuilder::note_written(std::string_view number) noexcept {
+  const std::size_t e = number.find_first_of("eE");
+  const std::string_view mantissa = number.substr(0, e);
+  const std::size_t point = mantissa.find('.');
+  const auto places = static_cast<int>(point == std::string_view::npos ? 0 : mantissa.size() - point - 1);
+  int exponent = 0;
+  if (e != std::string_view::npos) {
+    std::string_view digits = number.substr(e + 1);
+    if (digits.starts_with('+')) digits.remove_prefix(1);
+    std::from_chars(digits.data(), digits.data() + digits.size(), exponent);
+  }
+  const double digit = std::pow(10.0, std::clamp(exponent, -400, 400) - std::min(places, 400));
+  if (mesh_.last_digit == 0.0 || digit < mesh_.last_digit) mesh_.last_digit = digit;
 }
 
 // With neighbours that are the same taken once. Precondition: no corner is negative.
@@ -68,7 +85,8 @@ void MeshBuilder::add_strip(std::span<const std::int64_t> corners) {
 }
 
 ParsedMesh MeshBuilder::finish() {
-  auto& [soup, account] = mesh_;
+  TriangleSoup& soup = mesh_.soup;
+  FaceAccount& account = mesh_.account;
   account.vertices = soup.vertices.size();
   std::vector<bool> used(soup.vertices.size(), false);
   const auto use = [&](std::uint32_t corner) {

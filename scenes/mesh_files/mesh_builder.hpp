@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "scenes/mesh_files/face_account.hpp"
@@ -16,6 +17,8 @@ class MeshBuilder {
   void reserve(std::size_t vertices, std::size_t faces);
   // False for a coordinate that isn't finite.
   [[nodiscard]] bool add_vertex(double x, double y, double z);
+  // A coordinate as a text file writes it: its last digit says how the file rounds.
+  void note_written(std::string_view number) noexcept;
   [[nodiscard]] std::size_t vertices() const noexcept { return mesh_.soup.vertices.size(); }
 
   // A polygon by its corners, which may be vertices that are still to come. Neighbours that are the same count once.

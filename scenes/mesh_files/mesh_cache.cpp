@@ -29,7 +29,7 @@ using Digest = Sha256::Digest;
 constexpr std::uintmax_t kSmallest = 1'000'000;
 
 struct Header {
-  std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'm', 'e', 's', 'h', ' ', '2', '\n', '\0'};
+  std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'm', 'e', 's', 'h', ' ', '3', '\n', '\0'};
   Digest content{};
   std::uint64_t vertices = 0, triangles = 0, nodes = 0, dropped = 0, closed = 0;
   FaceAccount account;
@@ -58,6 +58,8 @@ std::optional<Digest> content_of(const std::filesystem::path& file, const MeshPl
   hash.add(std::as_bytes(std::span(extension)));
   hash.add(bytes_of(placement.scale));
   hash.add(std::as_bytes(std::span(placement.pose_W.data(), 16)));
+  hash.add(bytes_of(placement.anchor));
+  hash.add(bytes_of(placement.weld_m.value_or(-1.0)));
   hash.add(bytes_of(placement.close_holes_m));
   std::ifstream in(file, std::ios::binary);
   std::vector<std::byte> some(1 << 20);

@@ -6,10 +6,10 @@
 // (damaged, cut off, from another user or another version) is ignored. Where no secret or no file can be written, there
 // is no cache.
 //
-//   "proxarm mesh 2\n\0"   16 bytes
-//   SHA-256 of what the structure is of: extension, scale, pose, close_holes_m, bytes of the mesh file
+//   "proxarm mesh 3\n\0"   16 bytes
+//   SHA-256 of what the structure is of: extension, scale, pose, anchor, weld_m, close_holes_m, bytes of the mesh file
 //   numbers of vertices, triangles, pairs of nodes; dropped triangles; closed    5 × u64
-//   what became of the file's faces (FaceAccount)    11 × u64
+//   what became of the file's faces (FaceAccount)    15 × u64, 2 × f64
 //   vertices (3 × f64), triangles (3 × u32), pairs of nodes, as they are in memory
 //   HMAC-SHA-256 of the SHA-256 of all before
 #pragma once

@@ -1,16 +1,19 @@
 #include "scenes/mesh_files/mesh_file.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 #include <vector>
 
 #include "models/base/setup_error.hpp"
+#include "models/mesh/mesh_repair.hpp"
 #include "models/mesh/mesh_topology.hpp"
 #include "scenes/mesh_files/formats.hpp"
 #include "scenes/mesh_files/mesh_cache.hpp"
@@ -69,12 +72,13 @@ ParsedMesh parse(const std::filesystem::path& file, const std::string& extension
 // What was parsed as bytes, to pass it out of the sandbox.
 struct Counts {
   FaceAccount account;
+  double last_digit = 0.0;
   std::uint64_t vertices = 0, triangles = 0;
 };
 
 std::vector<std::byte> bytes_of(const ParsedMesh& mesh) {
   const TriangleSoup& soup = mesh.soup;
-  const Counts counts{mesh.account, soup.vertices.size(), soup.triangles.size()};
+  const Counts counts{mesh.account, mesh.last_digit, soup.vertices.size(), soup.triangles.size()};
   const std::size_t vertices = soup.vertices.size() * sizeof(Vec3);
   const std::size_t triangles = soup.triangles.size() * sizeof(soup.triangles[0]);
   std::vector<std::byte> bytes(sizeof counts + vertices + triangles);
@@ -90,7 +94,7 @@ ParsedMesh mesh_of(const std::vector<std::byte>& bytes) {
   Counts counts;
   if (bytes.size() < sizeof counts) throw std::runtime_error("nothing that can be read");
   std::memcpy(&counts, bytes.data(), sizeof counts);
-  ParsedMesh mesh{{}, counts.account};
+  ParsedMesh mesh{{}, counts.account, counts.last_digit};
   TriangleSoup& soup = mesh.soup;
   const std::size_t rest = bytes.size() - sizeof counts;
   if (counts.vertices > rest / sizeof(Vec3) || counts.triangles > rest / sizeof(soup.triangles[0]) ||
@@ -104,6 +108,60 @@ ParsedMesh mesh_of(const std::vector<std::byte>& bytes) {
   }
   std::memcpy(soup.triangles.data(), bytes.data() + sizeof counts + counts.vertices * sizeof(Vec3),
               counts.triangles * sizeof(soup.triangles[0]));
+  return mesh;
+}
+
+// From the file's unit to W.
+void place(TriangleSoup& soup, const MeshPlacement& placement) {
+  using Anchor = MeshPlacement::Anchor;
+  models::Pose pose = placement.pose_W;
+  if (placement.anchor != Anchor::origin) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    models::Bounds box{Vec3::Constant(infinity), Vec3::Constant(-infinity)};
+    for (const auto& triangle : soup.triangles) {
+      for (const std::uint32_t v : triangle) {
+        const Vec3 x = pose.linear() * Vec3(placement.scale * soup.vertices[v]);
+        box = {box.low.cwiseMin(x), box.high.cwiseMax(x)};
+      }
+    }
+    Vec3 at = 0.5 * (box.low + box.high);
+    if (placement.anchor == Anchor::low) at.z() = box.low.z();
+    pose.translation() -= at;
+  }
+  for (Vec3& x : soup.vertices) x = pose * Vec3(placement.scale * x);
+}
+
+// In the file's unit.
+double weld_of(const ParsedMesh& mesh) {
+  double largest = 0.0;
+  for (const Vec3& x : mesh.soup.vertices) largest = std::max(largest, x.lpNorm<Eigen::Infinity>());
+  return models::default_weld(largest, mesh.last_digit);
+}
+
+// With faces that are there more than once left out, and borders welded where it isn't closed. The mesh given if there
+// is nothing to be done.
+std::shared_ptr<const TriangleMesh> repaired(std::shared_ptr<const TriangleMesh> mesh, double weld_m,
+                                             FaceAccount& account) {
+  TriangleSoup soup{mesh->structure().vertices, mesh->structure().triangles};
+  const auto leave_out = [&] {
+    const models::RepeatedFaces repeated = models::leave_out_repeated(soup);
+    account.repeated += repeated.same;
+    account.double_sided += repeated.opposite;
+    return repeated.same + repeated.opposite > 0;
+  };
+  const bool fewer = leave_out();
+  models::WeldedCorners welded;
+  if (fewer || !mesh->closed()) welded = models::weld_borders(soup, weld_m);
+  if (!fewer && welded.corners == 0) return mesh;
+  if (welded.corners > 0) {
+    account.welded = welded.corners;
+    account.collapsed = welded.collapsed;
+    account.welded_within_m = weld_m;
+    account.welded_apart_m = welded.apart_m;
+    leave_out();
+  }
+  mesh = std::make_shared<const TriangleMesh>(std::move(soup));
+  account.flat += mesh->dropped_triangles();
   return mesh;
 }
 
@@ -138,9 +196,11 @@ LoadedMesh load_mesh(const std::filesystem::path& file, const MeshPlacement& pla
               cached->account};
     }
     ParsedMesh parsed = parse_mesh_file(file);
-    for (Vec3& x : parsed.soup.vertices) x = placement.pose_W * Vec3(placement.scale * x);
+    const double weld_m = placement.weld_m.value_or(placement.scale * weld_of(parsed));
+    place(parsed.soup, placement);
     auto mesh = std::make_shared<const TriangleMesh>(std::move(parsed.soup));
     parsed.account.flat = mesh->dropped_triangles();
+    mesh = repaired(std::move(mesh), weld_m, parsed.account);
     if (placement.close_holes_m > 0.0 && !mesh->closed()) {
       models::TriangleSoup filled = models::with_holes_closed(*mesh, placement.close_holes_m);
       parsed.account.closing = filled.triangles.size() - mesh->size();

@@ -30,6 +30,16 @@ std::string holes_text(const std::vector<MeshHole>& holes, std::size_t count) {
   return count > told ? text + "; …" : text;
 }
 
+std::string borders_text(const std::vector<models::MeshBorder>& borders) {
+  constexpr std::size_t told = 5;
+  std::string text;
+  for (std::size_t k = 0; k < std::min(borders.size(), told); ++k) {
+    text += (k == 0 ? "a border of " : "; of ") + counted(borders[k].edges, "edge", "edges") + ", " +
+            size_text(borders[k].length_m) + " long, at " + place_text(borders[k].centre);
+  }
+  return borders.size() > told ? text + "; …" : text;
+}
+
 void add(std::vector<std::string>& lines, const MeshDefect& defect, const char* one, const char* several) {
   if (defect.count == 0) return;
   lines.push_back(counted(defect.count, one, several) + ", " + (defect.count == 1 ? "" : "such as ") + "at " +
@@ -38,17 +48,38 @@ void add(std::vector<std::string>& lines, const MeshDefect& defect, const char* 
 
 }  // namespace
 
+std::string box_text(const models::TriangleMesh& mesh) {
+  const models::Bounds box = mesh.bounds();
+  const Vec3 size = box.high - box.low;
+  return size_text(size.x()) + " × " + size_text(size.y()) + " × " + size_text(size.z()) + ", from " +
+         place_text(box.low) + " to " + place_text(box.high);
+}
+
+std::vector<std::string> unit_hints(const models::TriangleMesh& mesh, double scale) {
+  constexpr double large_m = 200.0, small_m = 0.2e-3;
+  const double extent_m = (mesh.bounds().high - mesh.bounds().low).maxCoeff();
+  const auto hint = [&](const char* looks, double factor) {
+    return std::vector<std::string>{"it is " + size_text(extent_m) + " long: " + looks +
+                                    "; write scale_m: " + description::number_text(scale * factor)};
+  };
+  if (extent_m >= large_m) return hint("looks like mm", 1e-3);
+  if (extent_m <= small_m) return hint("looks like metres under a scale for mm", 1e3);
+  return {};
+}
+
 std::vector<std::string> mesh_report(const LoadedMesh& loaded) {
   const models::TriangleMesh& mesh = *loaded.mesh;
   const models::MeshTopology found = models::topology_of(mesh);
-  const Vec3 size = mesh.bounds().high - mesh.bounds().low;
   std::vector<std::string> lines{loaded.account.text()};
   lines.push_back(counted(mesh.size(), "triangle", "triangles") + " in " + counted(found.parts, "part", "parts") +
-                  (mesh.closed() ? ", closed; " : ", open; ") + size_text(size.x()) + " × " + size_text(size.y()) +
-                  " × " + size_text(size.z()));
+                  (mesh.closed() ? ", closed; " : ", open; ") + box_text(mesh));
   if (!found.holes.empty()) {
     lines.push_back(counted(found.holes.size(), "hole or border", "holes and borders") + ": " +
                     holes_text(found.holes, found.holes.size()));
+  }
+  if (!found.borders.empty()) {
+    lines.push_back(counted(found.borders.size(), "border that ends", "borders that end") +
+                    " at other faces: " + borders_text(found.borders));
   }
   add(lines, found.non_manifold, "edge with more than two faces", "edges with more than two faces");
   add(lines, found.flipped, "face turned against the others of its part (it holds all the same)",
@@ -59,6 +90,7 @@ std::vector<std::string> mesh_report(const LoadedMesh& loaded) {
   if (found.inside_out > 0) {
     lines.push_back(counted(found.inside_out, "closed part", "closed parts") + " with the fronts of all faces inside");
   }
+  for (const std::string& line : unit_hints(mesh, 1.0)) lines.push_back(line);
   const MeshDefect crossing = models::crossing_faces(mesh);
   add(lines, crossing, "pair of faces that cross or lie on one another",
       crossing.count < models::kMostCrossings ? "pairs of faces that cross or lie on one another"

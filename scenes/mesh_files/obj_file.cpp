@@ -77,7 +77,11 @@ class ObjText {
   // x y z, with a weight or with a colour.
   void read_vertex(std::string_view line) {
     std::array<double, 3> x{};
-    for (double& coordinate : x) coordinate = number_of(next_word(line), where_);
+    for (double& coordinate : x) {
+      const std::string_view number = next_word(line);
+      coordinate = number_of(number, where_);
+      mesh_.note_written(number);
+    }
     std::size_t more = 0;
     double weight = 1.0;
     for (std::string_view word = next_word(line); !word.empty(); word = next_word(line)) {

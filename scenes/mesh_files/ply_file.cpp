@@ -134,12 +134,15 @@ class Values {
   Values(std::string_view data, Format format) : data_(data), text_(data), format_(format) {}
 
   [[nodiscard]] bool binary() const noexcept { return format_ != Format::text; }
+  // The last value as the file writes it; empty in a binary one.
+  [[nodiscard]] std::string_view written() const noexcept { return written_; }
   [[nodiscard]] std::size_t left() const noexcept { return data_.size() - (binary() ? at_ : text_.at()); }
 
   double next(Type type, const std::string& of) {
     if (!binary()) {
       const std::string_view word = text_.word();
       if (word.empty()) cut_off(of);
+      written_ = word;
       return number_of(word, of);
     }
     const std::size_t size = size_of(type);
@@ -200,6 +203,7 @@ class Values {
   }
 
   std::string_view data_;
+  std::string_view written_;
   TextScanner text_;
   Format format_;
   std::size_t at_ = 0;
@@ -266,6 +270,7 @@ class Ply {
         const double value = values_.next(property.type, of);
         if (property.name.size() == 1 && property.name[0] >= 'x' && property.name[0] <= 'z') {
           x[static_cast<std::size_t>(property.name[0] - 'x')] = value;
+          if (element.name == "vertex" && !values_.binary()) mesh_.note_written(values_.written());
         }
         continue;
       }

@@ -109,6 +109,7 @@ class TextStl {
       for (double& coordinate : x) {
         const std::string_view number = text_.word();
         coordinate = number_of(number, text_.where());
+        mesh_.note_written(number);
       }
       corners_.push_back(static_cast<std::int64_t>(mesh_.vertices()));
       if (!mesh_.add_vertex(x[0], x[1], x[2])) refuse_not_finite(text_.where());

@@ -287,10 +287,13 @@ class RigidTool(ProgramTest):
         flipped = self.refuse("--scene", SCENES / "wall.yaml", "--tool",
                               self.written("flipped.yaml", "mesh: {file: flipped.obj, scale_m: 0.001}\n"))
         self.assertIn("which has faces turned against the others: 1, the first at x ", flipped)
-        # Two faces of the same three corners, back to back: closed, and nothing is inside.
+        # Two faces of the same three corners, back to back, are one surface; closed, nothing is inside of them.
         self.written("flat.obj", "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 3\nf 3 2 1\n")
         flat = self.refuse("--scene", SCENES / "wall.yaml", "--tool",
                            self.written("flat.yaml", "mesh: {file: flat.obj, scale_m: 0.001}\n"))
+        self.assertIn("is open, with a hole of 5.86 mm", flat)
+        flat = self.refuse("--scene", SCENES / "wall.yaml", "--tool",
+                           self.written("flat.yaml", "mesh: {file: flat.obj, scale_m: 0.001, close_holes_m: 0.01}\n"))
         self.assertIn("has 2 triangles, and the smallest body has 4", flat)
         # A cube beside the first one, inside out.
         turned = text + "".join("v %g %g %g\n" % (x + 50, y, z) for x, y, z in corners)

@@ -374,5 +374,12 @@ TEST(RigidWorld, RefusesCylindersBesideWhatTheyAreNotHeldBy) {
   EXPECT_THROW(RigidWorld(one(SphereTool{0.1}), {floor_with(-1.0)}), std::invalid_argument);
 }
 
+// Taken for a point, it ended in a crash at the first step beside a box.
+TEST(RigidWorld, RefusesAToolWithoutParts) {
+  RigidObject box;
+  box.shape = solid_of(BoxTool{Vec3(0.1, 0.1, 0.1)}, Pose::Identity());
+  EXPECT_THROW(RigidWorld(Tool{}, {box}), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace proxarm::models
