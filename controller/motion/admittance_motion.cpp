@@ -142,6 +142,18 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   }
 }
 
+void AdmittanceMotion::stand(const Measured& measured) noexcept {
+  if (!gear_damping_) return;
+  const JointVector twist_rad = arm_.motor_from_link(measured.link_rad) - measured.link_rad;
+  gear_damping_->stand(arm_.gear_stiffness_Nm_per_rad().cwiseProduct(twist_rad), measured.gear_torque_Nm);
+}
+
+std::optional<MissingWeight> AdmittanceMotion::missing_weight() const noexcept {
+  const auto reversed = gear_damping_ ? gear_damping_->reversed() : std::nullopt;
+  if (!reversed) return std::nullopt;
+  return MissingWeight{reversed->joint, reversed->read_Nm - reversed->weight_Nm, std::abs(reversed->weight_Nm)};
+}
+
 void AdmittanceMotion::set_period(double period_s) noexcept {
   period_s_ = period_s;
   parts_.inverse.set_max_step(final_.max_steps_rad(period_s));

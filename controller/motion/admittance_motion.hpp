@@ -42,7 +42,7 @@ class AdmittanceMotion final : public Motion {
                    const SessionSettings& settings, const HeldTool& tool = {});
 
   void wait_for_drives(const Measured& measured) noexcept override { final_.start(measured.drive_target_rad); }
-  void stand(const Measured& /*measured*/) noexcept override {}
+  void stand(const Measured& measured) noexcept override;
   bool render(const MotionCycle& cycle) noexcept override;
   bool free(const MotionCycle& cycle) noexcept override;
   void run_out() noexcept override { active_.add(final_.run_out()); }
@@ -63,6 +63,7 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] bool stands() const noexcept override { return final_.has_run_out(); }
   [[nodiscard]] bool backs_off() const noexcept override { return parts_.release->backs_off(); }
   [[nodiscard]] const models::Wrench* resting_wrench_W() const noexcept override { return hand_.resting_wrench_W(); }
+  [[nodiscard]] std::optional<MissingWeight> missing_weight() const noexcept override;
   [[nodiscard]] bool wants_hold() const noexcept override { return hand_.wants_hold(); }
   [[nodiscard]] const models::Vec3& proxy_W() const noexcept override { return state_.q_k1_W; }
   [[nodiscard]] Eigen::Quaterniond proxy_R_WT() const noexcept override { return tool().R_WT(); }

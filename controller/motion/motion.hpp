@@ -98,8 +98,9 @@ class Motion {
   // The hand's wrench as it is read while nobody holds the handle and the proxy has come to rest: all of it is the
   // sensor's bias. Null if somebody may be holding the handle.
   [[nodiscard]] virtual const models::Wrench* resting_wrench_W() const noexcept { return nullptr; }
-  // What the model of the device's weight lacks, where that is more than may be carried. Precondition: the hold before
-  // the first start is over.
+  // What the model of the arm's weight lacks, where that is more than may be: with torques, more than may be carried;
+  // with gears that are damped by their torque, a reading of the wrong sign. Precondition: the hold before the first
+  // start is over.
   [[nodiscard]] virtual std::optional<MissingWeight> missing_weight() const noexcept { return {}; }
   // Nobody holds the handle, and the cell asks for a hold in this case.
   [[nodiscard]] virtual bool wants_hold() const noexcept { return false; }

@@ -53,8 +53,11 @@ GearDamping::GearDamping(const models::Arm& arm, const std::vector<description::
   for (Eigen::Index i = 0; i < arm.axes(); ++i) {
     if ((choice.joints & 1u << i) == 0) continue;
     yield_rad_per_Nms_[i] = choice.damping_per_s / arm.gear_stiffness_Nm_per_rad()[i];
+    if (drives[static_cast<std::size_t>(i)].gear_torque->Nm_per_count != 0.0) {
+      sensors_ = static_cast<std::uint8_t>(sensors_ | 1u << i);
+    }
   }
-  state_.slow_Nm = state_.sum_Nms = JointVector::Zero(arm.axes());
+  state_.slow_Nm = state_.sum_Nms = state_.weight_Nm = state_.standing_Nm = JointVector::Zero(arm.axes());
   asked_Nm_.fill(JointVector::Zero(arm.axes()));
   set_period(period_s);
 }
@@ -81,6 +84,34 @@ JointVector GearDamping::step(const JointVector& asked_Nm, const JointVector& me
   const double gain_s = (1.0 - decay_) / gear_damping_band_rad_per_s;
   state_.sum_Nms = decay_ * state_.sum_Nms + gain_s * (beside_Nm - state_.slow_Nm);
   return -yield_rad_per_Nms_.cwiseProduct(state_.sum_Nms);
+}
+
+void GearDamping::stand(const JointVector& weight_Nm, const JointVector& measured_Nm) noexcept {
+  state_.weight_Nm += weight_Nm;
+  state_.standing_Nm += measured_Nm;
+  state_.stood_cycles += 1.0;
+}
+
+std::optional<GearDamping::Reversed> GearDamping::reversed() const noexcept {
+  if (!(state_.stood_cycles > 0.0)) return std::nullopt;
+  constexpr double least_share = 0.25, closer = 0.5;
+  const double least_Nm = least_share * state_.weight_Nm.cwiseAbs().maxCoeff() / state_.stood_cycles;
+  for (Eigen::Index i = 0; i < state_.weight_Nm.size(); ++i) {
+    const double weight_Nm = state_.weight_Nm[i] / state_.stood_cycles;
+    const double read_Nm = state_.standing_Nm[i] / state_.stood_cycles;
+    if ((sensors_ & 1u << i) == 0 || !(std::abs(weight_Nm) >= least_Nm) || weight_Nm == 0.0) continue;
+    if (std::abs(read_Nm + weight_Nm) < closer * std::abs(read_Nm - weight_Nm)) {
+      return Reversed{static_cast<std::int32_t>(i), read_Nm, weight_Nm};
+    }
+  }
+  return std::nullopt;
+}
+
+void GearDamping::start() noexcept {
+  state_.started = false;
+  state_.weight_Nm.setZero();
+  state_.standing_Nm.setZero();
+  state_.stood_cycles = 0.0;
 }
 
 void GearDamping::archive(fieldbus::StateArchive& state) noexcept {

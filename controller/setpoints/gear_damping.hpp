@@ -16,6 +16,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "models/arm/arm.hpp"
@@ -53,22 +54,37 @@ class GearDamping {
 
   void set_period(double period_s) noexcept;
   // Begins anew: the first step adds nothing.
-  void start() noexcept { state_.started = false; }
+  void start() noexcept;
   // `asked_Nm`: what setpoints as they leave now ask of the gears, by their mean acceleration over the period before.
   // `measured_Nm`: the gears' torques and, about the joints, the hand's. Returns what is to be added to the setpoints,
   // rad.
   models::JointVector step(const models::JointVector& asked_Nm, const models::JointVector& measured_Nm) noexcept;
+  // While the arm stands, once a cycle until start(): the torques that its weight asks of the gears, and what is
+  // measured.
+  void stand(const models::JointVector& weight_Nm, const models::JointVector& measured_Nm) noexcept;
+  // The first joint whose torque sensor has read the weight with the wrong sign: such a reading drives the modes.
+  // Judged where the weight is a quarter of what the joint with most carries, or more. An offset is taken for a wrong
+  // sign only where it is beyond 4/3 of that; a second encoder's is unknown, and a joint without a weight tells
+  // nothing.
+  struct Reversed {
+    std::int32_t joint;
+    double read_Nm, weight_Nm;
+  };
+  [[nodiscard]] std::optional<Reversed> reversed() const noexcept;
   void archive(fieldbus::StateArchive& state) noexcept;
 
  private:
   static constexpr std::size_t kept = 128;  // more than the longest lag, and a power of two
   struct State {
-    models::JointVector slow_Nm, sum_Nms;  // τ − τ̂ below the band, and y
+    models::JointVector slow_Nm, sum_Nms;        // τ − τ̂ below the band, and y
+    models::JointVector weight_Nm, standing_Nm;  // sums over the cycles in which the arm stood
+    double stood_cycles = 0.0;
     std::uint64_t steps = 0;
     bool started = false;
   };
 
   models::JointVector yield_rad_per_Nms_;  // κ/k; 0 of a joint that isn't damped
+  std::uint8_t sensors_ = 0;               // a bit for each joint that is damped by a torque sensor
   double drive_lag_s_ = 0.0, reading_delay_s_ = 0.0, period_s_ = 0.0;
   double lag_periods_ = 0.0, decay_ = 1.0;          // exp(−aT)
   std::array<models::JointVector, kept> asked_Nm_;  // τ̂ of the latest steps

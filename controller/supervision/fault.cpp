@@ -151,9 +151,10 @@ constexpr std::array texts{
               "look for a drive that runs off, an encoder that is off, or a load that the drive can't hold, before "
               "anybody comes near"},
     FaultText{Fault::weight_unknown, "weight_unknown", Reaction::stop_1,
-              "to hold the device still, this drive adds a torque to what the weight of its model asks for", "Nm",
-              "are the masses of the URDF or of `tool` wrong, does somebody lean on the device, or is more mounted on "
-              "it? Correct them; what is left over would move it with nobody there",
+              "to hold the arm still, this joint has a torque beside what the weight of its model asks for", "Nm",
+              "are the masses of the URDF or of `tool` wrong, does somebody lean on the arm, or is more mounted on "
+              "it? Correct them; what is left over would move a device with nobody there. Where `gear_torque` is "
+              "measured: has its scale the wrong sign?",
               still},
     FaultText{Fault::force_jumped, "force_jumped", Reaction::stop_1,
               "the force has changed within a sample by more than hand and handle can make", "N",

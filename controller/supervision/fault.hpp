@@ -58,8 +58,8 @@ enum class Fault : std::uint8_t {
   enabling_not_pressed,  // it wasn't released and pressed within enabling_timeout_s of the start: nothing moves
   enabling_squeezed,     // a switch with three positions was squeezed through
   standstill_left,       // a joint moves, by its encoder, where the arm is to stand
-  weight_unknown,        // impedance type: to hold the device takes another torque than its weight: nothing moves
-  force_jumped,          // the force has changed within a sample by more than hand and handle can make
+  weight_unknown,  // to hold a device takes another torque than its weight, or a gear's reads reversed: nothing moves
+  force_jumped,    // the force has changed within a sample by more than hand and handle can make
 };
 inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::force_jumped) + 1;
 

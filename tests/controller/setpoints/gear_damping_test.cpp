@@ -124,6 +124,34 @@ TEST(GearDamping, AWrongReadingMovesAMotorNoFurtherThanIsSaid) {
   EXPECT_LT(std::abs(damping.step(none, reading)[0]), 1e-9 * said) << "it forgets";
 }
 
+TEST(GearDamping, KnowsAReadingOfTheWrongSignByTheWeight) {
+  const description::Cell cell = measuring_cell();
+  const Arm arm(cell);
+  GearDamping damping(arm, cell.drives, {100.0, 0b111}, T);
+  JointVector weight = JointVector::Zero(6);
+  weight << 0.0, 200.0, -60.0, 5.0, 0.0, 0.0;
+  const auto judged = [&](const JointVector& read) {
+    damping.start();
+    for (int k = 0; k < 10; ++k) damping.stand(weight, read);
+    const auto reversed = damping.reversed();
+    return reversed ? reversed->joint : -1;
+  };
+  EXPECT_FALSE(damping.reversed()) << "it hasn't stood yet";
+  EXPECT_EQ(judged(weight), -1);
+  EXPECT_EQ(judged(-weight), 1);
+  EXPECT_EQ(judged(-0.4 * weight), 1);
+  EXPECT_EQ(judged(JointVector::Zero(6)), -1) << "one that reads nothing isn't reversed";
+  JointVector elbow = weight;
+  elbow[2] = 60.0;
+  EXPECT_EQ(judged(elbow), 2);
+  // 4/3 of the elbow's weight is the offset at its edge.
+  EXPECT_EQ(judged(weight + JointVector::Constant(6, 79.0)), -1);
+  EXPECT_EQ(judged(weight + JointVector::Constant(6, 81.0)), 2);
+  weight << 0.0, 200.0, -49.0, 5.0, 0.0, 0.0;
+  EXPECT_EQ(judged(JointVector(weight.cwiseProduct((JointVector(6) << 1, 1, -1, 1, 1, 1).finished()))), -1)
+      << "less than a quarter of the shoulder's";
+}
+
 TEST(GearDamping, LeavesJointsAloneThatSwingTooFastForIt) {
   const description::Cell cell = measuring_cell();
   const Arm arm(cell);
