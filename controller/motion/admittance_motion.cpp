@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/setpoints/setpoint_envelope.hpp"
 #include "models/base/archive_fields.hpp"
 #include "models/geometry/tool_pose.hpp"
 
@@ -45,13 +46,9 @@ Vec3 no_faster(const Vec3& omega_W, double most) noexcept {
 // drive.
 double drives_lag_s(const std::vector<description::DriveDescription>& drives,
                     const description::CellLimits& limits) noexcept {
-  double drive_s = 0.0;
-  for (const description::DriveDescription& drive : drives) {
-    drive_s = std::max(drive_s, 1.0 / (2.0 * std::numbers::pi * drive.position_bandwidth_Hz));
-  }
   const double filter_s =
       limits.setpoint_bandwidth_Hz > 0.0 ? 1.0 / (std::numbers::pi * limits.setpoint_bandwidth_Hz) : 0.0;
-  return filter_s + drive_s;
+  return filter_s + slowest_drive_lag_s(drives);
 }
 
 double steel_lag_s(double drives_lag_s, double period_s, double horizon_s) noexcept {

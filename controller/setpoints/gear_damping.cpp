@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "controller/setpoints/setpoint_envelope.hpp"
 #include "models/base/archive_fields.hpp"
 
 namespace proxarm::controller {
@@ -15,25 +16,18 @@ double gear_torque_lag_periods(double drive_lag_s, double reading_delay_s, doubl
   return std::min(most, until_reached + (drive_lag_s + reading_delay_s) / period_s);
 }
 
-namespace {
-// The slowest drive's lag, and the oldest reading.
-struct Lag {
-  double drive_s = 0.0, reading_s = 0.0;
-};
-Lag lag_of(const std::vector<description::DriveDescription>& drives) noexcept {
-  Lag lag;
+double gear_torque_delay_s(const std::vector<description::DriveDescription>& drives) noexcept {
+  double oldest_s = 0.0;
   for (const description::DriveDescription& drive : drives) {
-    lag.drive_s = std::max(lag.drive_s, 1.0 / (2.0 * std::numbers::pi * drive.position_bandwidth_Hz));
-    if (drive.gear_torque) lag.reading_s = std::max(lag.reading_s, drive.gear_torque->delay_s);
+    if (drive.gear_torque) oldest_s = std::max(oldest_s, drive.gear_torque->delay_s);
   }
-  return lag;
+  return oldest_s;
 }
-}  // namespace
 
 std::uint8_t damped_joints(const models::Arm& arm, const std::vector<description::DriveDescription>& drives,
                            double period_s) {
-  const Lag lag = lag_of(drives);
-  const double quarter_s = period_s * gear_torque_lag_periods(lag.drive_s, lag.reading_s, period_s);
+  const double quarter_s =
+      period_s * gear_torque_lag_periods(slowest_drive_lag_s(drives), gear_torque_delay_s(drives), period_s);
   const Eigen::VectorXd mass = arm.link_mass_matrix(arm.start_rad()).diagonal();
   unsigned joints = 0;
   for (Eigen::Index i = 0; i < arm.axes(); ++i) {
@@ -46,10 +40,9 @@ std::uint8_t damped_joints(const models::Arm& arm, const std::vector<description
 
 GearDamping::GearDamping(const models::Arm& arm, const std::vector<description::DriveDescription>& drives,
                          const GearDampingChoice& choice, double period_s)
-    : yield_rad_per_Nms_(JointVector::Zero(arm.axes())) {
-  const Lag lag = lag_of(drives);
-  drive_lag_s_ = lag.drive_s;
-  reading_delay_s_ = lag.reading_s;
+    : yield_rad_per_Nms_(JointVector::Zero(arm.axes())),
+      drive_lag_s_(slowest_drive_lag_s(drives)),
+      reading_delay_s_(gear_torque_delay_s(drives)) {
   for (Eigen::Index i = 0; i < arm.axes(); ++i) {
     if ((choice.joints & 1u << i) == 0) continue;
     yield_rad_per_Nms_[i] = choice.damping_per_s / arm.gear_stiffness_Nm_per_rad()[i];

@@ -33,6 +33,9 @@ inline constexpr double gear_damping_band_rad_per_s = 40.0;
 // own lag and the reading's. More than a hundred are counted as a hundred.
 [[nodiscard]] double gear_torque_lag_periods(double drive_lag_s, double reading_delay_s, double period_s) noexcept;
 
+// How old a reading of the gears' torque is, at most.
+[[nodiscard]] double gear_torque_delay_s(const std::vector<description::DriveDescription>& drives) noexcept;
+
 // How gears are damped: κ in 1/s, and a bit for each joint that is.
 struct GearDampingChoice {
   double damping_per_s = 0.0;

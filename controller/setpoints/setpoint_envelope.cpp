@@ -9,6 +9,14 @@ double following_lag_s(const description::DriveDescription& drive, double period
   return 5.0 * period_s + 2.0 * feedback_period_s + 1.0 / (2.0 * std::numbers::pi * drive.position_bandwidth_Hz);
 }
 
+double slowest_drive_lag_s(const std::vector<description::DriveDescription>& drives) noexcept {
+  double slowest_s = 0.0;
+  for (const description::DriveDescription& drive : drives) {
+    slowest_s = std::max(slowest_s, 1.0 / (2.0 * std::numbers::pi * drive.position_bandwidth_Hz));
+  }
+  return slowest_s;
+}
+
 void SetpointEnvelope::step(Eigen::Index joint, double setpoint_rad, double period_s, double lag_s) noexcept {
   const double s = setpoint_rad, kept = 1.0 - period_s / lag_s;
   double &low = low_rad_[joint], &high = high_rad_[joint];

@@ -9,6 +9,8 @@
 // which is 0.2 mrad at 30 rad/s² and 1 ms.
 #pragma once
 
+#include <vector>
+
 #include "models/arm/arm.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/description/cell.hpp"
@@ -19,6 +21,9 @@ namespace proxarm::controller {
 // drive's own lag.
 [[nodiscard]] double following_lag_s(const description::DriveDescription& drive, double period_s,
                                      double feedback_period_s) noexcept;
+
+// The lag of the slowest drive's position loop: 1/(2π f) of its bandwidth f.
+[[nodiscard]] double slowest_drive_lag_s(const std::vector<description::DriveDescription>& drives) noexcept;
 
 class SetpointEnvelope {
  public:

@@ -90,14 +90,6 @@ void add_drives(const description::Cell& cell, ElasticArm& arm) {
   arm.rotor_kg_m2 = rotor;
   arm.drive_rad_per_s = omega;
 }
-
-double torque_delay_s(const description::Cell& cell) {
-  double delay_s = 0.0;
-  for (const description::DriveDescription& drive : cell.drives) {
-    if (drive.gear_torque) delay_s = std::max(delay_s, drive.gear_torque->delay_s);
-  }
-  return delay_s;
-}
 }  // namespace
 
 ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell) {
@@ -126,7 +118,7 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
     d = cell.drives[static_cast<std::size_t>(i)].gear_damping_Nms_per_rad.value_or(2.0 * ringing * k / first);
   }
   add_drives(cell, out);
-  out.torque_delay_s = torque_delay_s(cell);
+  out.torque_delay_s = gear_torque_delay_s(cell.drives);
   return out;
 }
 

@@ -1,14 +1,13 @@
 """Gears damped by their measured torque, as a user has them: lighter masses, truer ones, and readings that lie. What the
 steel does and what the hand feels are computed here, from the records."""
-import cmath
 import csv
 import math
 import re
 import unittest
 
 from harness import SOURCE, ProgramTest
+from steel import coefficient
 
-PERIOD_S = 1e-3
 FREQUENCIES_HZ = (1.0, 2.0, 5.0, 10.0)
 NUDGE = """name: nudge
 mass_kg: 1
@@ -29,12 +28,6 @@ def sines(axis, share):
         lines.append(f"  - {{frequency_Hz: {frequency_Hz}, amplitude_m: {amplitude_m:.9f}, "
                      f"phase_rad: {math.pi * (i % 2)!r}, direction: {direction}}}")
     return "\n".join(lines) + "\n"
-
-
-def coefficient(values, frequency_Hz):
-    mean = sum(values) / len(values)
-    return sum((value - mean) * cmath.exp(-2j * math.pi * frequency_Hz * PERIOD_S * k)
-               for k, value in enumerate(values))
 
 
 class GearDamping(ProgramTest):

@@ -7,6 +7,7 @@ import math
 import unittest
 
 from harness import SOURCE, ProgramTest
+from steel import coefficient
 
 FREQUENCIES_HZ = (2.0, 5.0, 10.0)
 PERIOD_S = 1e-3
@@ -23,12 +24,6 @@ def hand():
         lines.append(f"  - {{frequency_Hz: {frequency_Hz}, amplitude_m: {amplitude_m:.9f}, phase_rad: {phase_rad!r}, "
                      "direction: [1, 0, 0]}")
     return "\n".join(lines) + "\n"
-
-
-def coefficient(values, frequency_Hz):
-    mean = sum(values) / len(values)
-    return sum((value - mean) * cmath.exp(-2j * math.pi * frequency_Hz * PERIOD_S * k)
-               for k, value in enumerate(values))
 
 
 class Lookahead(ProgramTest):

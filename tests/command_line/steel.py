@@ -1,5 +1,7 @@
 """Where the simulated steel goes, which the controller never sees, by a session's record; and a hand that isn't there."""
+import cmath
 import csv
+import math
 
 # From power on to the first cycle, to a cycle or two.
 BEFORE_FIRST_CYCLE_S, SLACK_S = 0.2, 0.003
@@ -11,6 +13,13 @@ damping_Ns_per_m: 0
 waypoints:
   - {time_s: 0, offset_m: [0, 0, 0]}
 """
+
+
+def coefficient(values, frequency_Hz, period_s=1e-3):
+    """Of a sine in values that are read once a period, without a factor that two of them share."""
+    mean = sum(values) / len(values)
+    return sum((value - mean) * cmath.exp(-2j * math.pi * frequency_Hz * period_s * k)
+               for k, value in enumerate(values))
 
 
 def vectors(column, rows, name, unit):

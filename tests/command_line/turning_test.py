@@ -6,6 +6,7 @@ import sys
 import unittest
 
 from harness import SOURCE, ProgramTest
+from steel import coefficient
 
 sys.path.insert(0, str(SOURCE / "tests/soak"))
 import turning_hunt  # noqa: E402
@@ -27,12 +28,6 @@ def hand():
             lines.append(f"  - {{frequency_Hz: {frequency_Hz}, amplitude_rad: {AMPLITUDE_RAD}, "
                          f"direction: {direction}}}")
     return "\n".join(lines) + "\n"
-
-
-def coefficient(values, frequency_Hz):
-    mean = sum(values) / len(values)
-    return sum((value - mean) * cmath.exp(-2j * math.pi * frequency_Hz * PERIOD_S * k)
-               for k, value in enumerate(values))
 
 
 def product(a, b):

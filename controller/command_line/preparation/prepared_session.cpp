@@ -13,6 +13,7 @@
 #include "controller/session/bring_up.hpp"
 #include "controller/session/identifiers.hpp"
 #include "controller/session/reachable_scene.hpp"
+#include "controller/setpoints/setpoint_envelope.hpp"
 #include "fieldbus/cia402/cia402_units.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/tool_inertia.hpp"
@@ -79,15 +80,6 @@ double sensor_delay_s(const description::SensorPlacement& sensor) {
 // Of ElasticSetpoint's critically damped filter: 2/ω.
 double setpoint_filter_delay_s(const description::Cell& cell) {
   return cell.limits.setpoint_bandwidth_Hz > 0.0 ? 2.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz) : 0.0;
-}
-
-// The slowest drive sets the pace.
-double drive_time_constant_s(const description::Cell& cell) {
-  double slowest_s = 0.0;
-  for (const description::DriveDescription& drive : cell.drives) {
-    slowest_s = std::max(slowest_s, 1.0 / (2.0 * pi * drive.position_bandwidth_Hz));
-  }
-  return slowest_s;
 }
 
 // A simulated sensor without noise repeats itself, a real one never does; and one that is slower than the cycle is read
@@ -599,7 +591,7 @@ PreparedSession prepare(const RunOptions& options) {
     require_renderable_tool(session);
     return session;
   }
-  session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
+  session.loop.drive_time_constant_s = controller::slowest_drive_lag_s(session.cell.drives);
   session.loop.handle_mass_kg = session.cell.tool.mass_kg;
   session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   session.loop.spring_N_per_m = session.settings.spring_N_per_m;
