@@ -11,7 +11,8 @@
 #include <sstream>
 #include <string_view>
 
-#include "controller/studies/common/chart.hpp"
+#include "controller/studies/fidelity_bands.hpp"
+#include "controller/studies/fidelity_plot.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -19,7 +20,6 @@ namespace {
 using nlohmann::json;
 using Complex = std::complex<double>;
 
-constexpr std::array<double, 3> limits{0.05, 0.1, 0.25};
 constexpr std::array<double, 13> frequencies_Hz{0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0};
 
 // At low frequencies as much travel as a hand takes, above a velocity of 5 cm/s each. A light arm gets half of it: what
@@ -105,45 +105,7 @@ Complex coefficient(const std::vector<double>& x, double frequency_Hz, double pe
   return 2.0 * sum / static_cast<double>(x.size());
 }
 
-std::string percent(double share) {
-  std::array<char, 20> text{};
-  std::snprintf(text.data(), text.size(), "%g %%", 100.0 * share);
-  return text.data();
-}
-
-// Up to which frequency the error stays below a limit: between two that were measured, on the straight line through
-// their logarithms. Below 0.3 Hz only a few periods are measured. 0: not even there.
-double band_Hz(const std::map<double, double>& error_of_Hz, double limit) {
-  constexpr double lowest_Hz = 0.3;
-  double before_Hz = 0.0, before = 0.0;
-  for (const auto& [f, error] : error_of_Hz) {
-    if (f < lowest_Hz) continue;
-    if (error > limit) {
-      if (before_Hz == 0.0) return 0.0;
-      const double share = std::log(limit / before) / std::log(error / before);
-      return before_Hz * std::pow(f / before_Hz, share);
-    }
-    before_Hz = f;
-    before = error;
-  }
-  return before_Hz;
-}
-
 constexpr std::array directions{"x", "y", "z"};
-
-bool is_turning(const Table& table, std::size_t row) { return table.number(row, table.column("inertia_kg_m2")) != 0.0; }
-
-std::string label(const Table& table, std::size_t row) {
-  const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
-  const bool turning = is_turning(table, row);
-  const std::string& cell = table.text(row, table.column("cell"));
-  char text[100];
-  std::snprintf(text, sizeof text, "%s%s%g %s, T = %g ms%s%s%s", cell == "default" ? "" : cell.c_str(),
-                cell == "default" ? "" : ", ", value(turning ? "inertia_kg_m2" : "mass_kg"), turning ? "kg m²" : "kg",
-                1e3 * value("period_s"), value("drive_factor") < 1.0 ? ", slow drives" : "",
-                value("lookahead") != 0.0 ? ", lookahead" : "", value("torque") != 0.0 ? " and torque" : "");
-  return text;
-}
 
 const std::string& direction(const Table& table, std::size_t row) { return table.text(row, table.column("along")); }
 
@@ -258,7 +220,7 @@ class WorstOf {
 json bands_of(const WorstOf& errors) {
   json bands;
   for (const auto& [name, error_of_Hz] : errors.worst()) {
-    for (const double limit : limits) bands[name][percent(limit)] = band_Hz(error_of_Hz, limit);
+    for (const double limit : fidelity_limits) bands[name][percent_text(limit)] = band_Hz(error_of_Hz, limit);
   }
   return bands;
 }
@@ -270,7 +232,7 @@ json Fidelity::headline(const Table& table, const Options& /*options*/) const {
   WorstOf mass(0.0), inertia(0.0), shares(1.0), width(0.0);
   std::int64_t ended = 0;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string name = label(table, row), &along = direction(table, row);
+    const std::string name = fidelity_label(table, row), &along = direction(table, row);
     const double f = value(row, "frequency_Hz");
     if (!std::isfinite(value(row, is_turning(table, row) ? "torque_Nm" : "force_N"))) {
       ++ended;
@@ -311,170 +273,9 @@ json Fidelity::headline(const Table& table, const Options& /*options*/) const {
         {"ended_by_fault", "rows without a figure because a fault ended their session"}}}};
 }
 
-namespace {
-
-// Of each job and frequency, in this order, the row of the direction in which the error is largest.
-std::vector<std::size_t> worst_rows(const Table& table) {
-  std::map<std::pair<std::size_t, double>, std::size_t> worst;
-  const auto error = [&](std::size_t row) {
-    return table.number(row, table.column(is_turning(table, row) ? "inertia_error" : "mass_error"));
-  };
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto [at, is_new] =
-        worst.emplace(std::pair{table.job(row), table.number(row, table.column("frequency_Hz"))}, row);
-    if (!is_new && error(row) > error(at->second)) at->second = row;
-  }
-  std::vector<std::size_t> rows;
-  for (const auto& [job_and_frequency, row] : worst) rows.push_back(row);
-  return rows;
-}
-
-// Whether it is drawn. Of measured torques one shows what they give. Other cells without lookahead, drives of half the
-// speed and other timesteps feel nearly the same, and 2 kg aren't stable in all poses.
-bool is_shown(const Table& table, std::size_t row) {
-  const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
-  if (value("drive_factor") != 1.0) return false;
-  const bool is_default = table.text(row, table.column("cell")) == "default";
-  if (value("torque") != 0.0 && !(is_default && value("mass_kg") == 10.0)) return false;
-  if (!is_default && value("lookahead") == 0.0) return false;
-  return value("wall") != 0.0 || (value("period_s") == 1e-3 && value("mass_kg") != 2.0);
-}
-
-// One for each job whose rows are `drawn`, of what `y` says of a row. `styles`: of each label.
-template <typename Drawn, typename Value>
-std::vector<Curve> curves(const Table& table, Drawn drawn, Value y, std::map<std::string, int>& styles) {
-  std::vector<Curve> list;
-  std::map<std::size_t, std::size_t> of_job;
-  for (const std::size_t row : worst_rows(table)) {
-    const double value = y(row);
-    if (!is_shown(table, row) || !drawn(row) || !std::isfinite(value)) continue;
-    const auto [at, is_new] = of_job.emplace(table.job(row), list.size());
-    if (is_new) {
-      const std::string name = label(table, row);
-      list.push_back(
-          {.name = name, .style = styles.emplace(name, static_cast<int>(styles.size())).first->second, .marks = true});
-    }
-    Curve& curve = list[at->second];
-    curve.x.push_back(table.number(row, table.column("frequency_Hz")));
-    curve.y.push_back(value);
-  }
-  return list;
-}
-
-// Error, size and phase of F/a, or of torque and angular acceleration.
-template <typename Drawn>
-std::vector<Panel> free_panels(const Table& table, Drawn drawn, bool turning, std::map<std::string, int>& styles) {
-  const auto value = [&](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
-  const char* const ratio = turning ? "τ/α" : "F/a";
-  const std::string asked = turning ? "J" : "M",
-                    where = turning ? "Turning: " : "Free motion: ", what = turning ? "inertia" : "mass";
-  const char *const real = turning ? "inertia_real_kg_m2" : "mass_real_kg", *const imaginary =
-                                                                                turning ? "inertia_imag_kg_m2"
-                                                                                        : "mass_imag_kg";
-  Panel error{.title = where + "error against the wanted " + what,
-              .x_label = "frequency (Hz)",
-              .y_label = std::string("|") + ratio + " − " + asked + "|/" + asked,
-              .log_x = true,
-              .log_y = true,
-              .x_low = 0.1,
-              .x_high = 40.0,
-              .y_low = 1e-3,
-              .y_high = 10.0};
-  Panel size{.title = where + what + " felt over wanted (below 0 it pulls)",
-             .x_label = "frequency (Hz)",
-             .y_label = std::string("Re(") + ratio + ")/" + asked,
-             .log_x = true,
-             .x_low = 0.1,
-             .x_high = 40.0,
-             .y_low = -2.0,
-             .y_high = 3.0};
-  Panel phase{.title = where + "phase (above 0 it pushes on)",
-              .x_label = "frequency (Hz)",
-              .y_label = std::string("arg(") + ratio + ") (degrees)",
-              .log_x = true,
-              .x_low = 0.1,
-              .x_high = 40.0,
-              .y_low = -180.0,
-              .y_high = 180.0};
-  const auto of_rows = [&](auto y) { return curves(table, drawn, y, styles); };
-  error.curves = of_rows([&](std::size_t row) { return value(row, turning ? "inertia_error" : "mass_error"); });
-  error.levels.assign(limits.begin(), limits.end());
-  size.curves =
-      of_rows([&](std::size_t row) { return value(row, real) / value(row, turning ? "inertia_kg_m2" : "mass_kg"); });
-  phase.curves = of_rows(
-      [&](std::size_t row) { return 180.0 / std::numbers::pi * std::atan2(value(row, imaginary), value(row, real)); });
-  return {error, size, phase};
-}
-
-}  // namespace
-
-namespace {
-
-// Up to which frequency what is drawn feels within 10 %, of the first setup and of that with the widest band.
-std::string fidelity_answer(const Table& table, bool turning) {
-  std::map<std::string, std::map<double, double>> errors;
-  std::string first;
-  for (const std::size_t row : worst_rows(table)) {
-    const double error = table.number(row, table.column(turning ? "inertia_error" : "mass_error"));
-    if (!is_shown(table, row) || is_turning(table, row) != turning || !std::isfinite(error)) continue;
-    if (table.number(row, table.column("wall")) != 0.0) continue;
-    const std::string name = label(table, row);
-    if (first.empty()) first = name;
-    errors[name][table.number(row, table.column("frequency_Hz"))] = error;
-  }
-  if (first.empty()) return "What the hand feels at the simulated arm";
-  constexpr double limit = 0.1;
-  const auto told = [&errors](std::string name) {
-    std::array<char, 60> words{};
-    std::snprintf(words.data(), words.size(), " up to %.2g Hz", band_Hz(errors.at(name), limit));
-    constexpr std::string_view usual = ", T = 1 ms";
-    if (const std::size_t at = name.find(usual); at != std::string::npos) name.erase(at, usual.size());
-    if (const std::size_t at = name.find(", lookahead"); at != std::string::npos) name.replace(at, 2, " with ");
-    return name + (name.find("with") == std::string::npos ? " feels within 10 %" : "") + words.data();
-  };
-  const auto widest =
-      std::ranges::max_element(errors, {}, [](const auto& setup) { return band_Hz(setup.second, limit); });
-  const bool others = band_Hz(widest->second, limit) > 1.2 * band_Hz(errors.at(first), limit);
-  return told(first) + (others ? ", " + told(widest->first) : "") +
-         (turning ? ", about every axis" : ", in every direction");
-}
-
-}  // namespace
-
 std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*options*/,
                                         const std::filesystem::path& out) const {
-  const auto at_wall = [&](std::size_t row) { return table.number(row, table.column("wall")) != 0.0; };
-  const auto turns = [&](std::size_t row) { return is_turning(table, row); };
-  const auto is_free = [&](std::size_t row) { return !at_wall(row) && !turns(row); };
-  Chart place{.title = fidelity_answer(table, false),
-              .columns = 2,
-              .panel_width = 640,
-              .panel_height = 460,
-              .common_key = true};
-  Chart turning = place;
-  turning.title = fidelity_answer(table, true);
-  turning.columns = 3;
-  turning.panel_width = 560;
-  Panel wall{.title = "Against a wall: stiffness felt",
-             .x_label = "frequency (Hz)",
-             .y_label = "|F/x| (N/m)",
-             .log_x = true,
-             .log_y = true,
-             .x_low = 0.1,
-             .x_high = 40.0};
-  std::map<std::string, int> place_styles, turning_styles;
-  place.panels = free_panels(table, is_free, false, place_styles);
-  wall.curves = curves(
-      table, at_wall, [&](std::size_t row) { return table.number(row, table.column("stiffness_N_per_m")); },
-      place_styles);
-  place.panels.push_back(wall);
-  turning.panels = free_panels(table, turns, true, turning_styles);
-  std::vector<std::string> warnings;
-  for (const auto& [chart, file] : {std::pair{&place, "fidelity.svg"}, std::pair{&turning, "fidelity_turning.svg"}}) {
-    const std::string warning = draw(*chart, out / file);
-    if (!warning.empty()) warnings.push_back(warning);
-  }
-  return warnings;
+  return draw_fidelity(table, out);
 }
 
 namespace {
@@ -483,10 +284,10 @@ void add_errors(std::ostringstream& text, const json& headline, const char* of, 
   for (const auto& item : headline.at(of).items()) {
     std::array<char, 60> word{};
     text << "error of the " << what << " felt, " << item.key() << ":";
-    for (const double limit : limits) {
-      const double band = headline.at("band_Hz").at(item.key()).at(percent(limit)).get<double>();
-      std::snprintf(word.data(), word.size(), "%s at most %s up to %.2g Hz", limit == limits[0] ? "" : ",",
-                    percent(limit).c_str(), band);
+    for (const double limit : fidelity_limits) {
+      const double band = headline.at("band_Hz").at(item.key()).at(percent_text(limit)).get<double>();
+      std::snprintf(word.data(), word.size(), "%s at most %s up to %.2g Hz", limit == fidelity_limits[0] ? "" : ",",
+                    percent_text(limit).c_str(), band);
       text << word.data();
     }
     std::map<double, double> sorted;

@@ -9,6 +9,7 @@
 
 #include "controller/proxies/impedance_proxy.hpp"
 #include "controller/studies/common/chart.hpp"
+#include "controller/studies/common/chart_page.hpp"
 #include "models/surfaces/friction_plane.hpp"
 
 namespace proxarm::studies {
@@ -21,11 +22,15 @@ using nlohmann::json;
 using Vec2 = Vec<2>;
 
 struct Law {
-  const char* name;  // the paper's number
+  const char *name, *title;  // the paper's number, and in the picture
   ImpedanceLaw law;
 };
-constexpr std::array<Law, 3> laws{
-    {{"1", ImpedanceLaw::plain}, {"5", ImpedanceLaw::damped_motion}, {"23", ImpedanceLaw::implicit}}};
+constexpr std::array<Law, 3> laws{{{"1", "spring alone", ImpedanceLaw::plain},
+                                   {"5", "spring and damper", ImpedanceLaw::damped_motion},
+                                   {"23", "implicit, default", ImpedanceLaw::implicit}}};
+
+// A force that is none.
+constexpr double nothing_N = 1e-3;
 
 constexpr double above_m = 0.015, below_m = -0.020, rub_m = 0.03;
 constexpr double press_from_s = 0.3, press_to_s = 0.6, rub_from_s = 1.4, rub_to_s = 3.6, leave_from_s = 4.2,
@@ -132,48 +137,112 @@ json Figure5::headline(const Table& table, const Options& /*options*/) const {
             {"setup", "what was simulated; device mass and hand are chosen here, the rest is the paper's"}}}};
 }
 
+namespace {
+
+// A row of the picture: a signal, for each law.
+struct Signal {
+  const char *column, *label;
+  double factor, low, high, tick;
+  double from_s = 0.0, to_s = 5.0;
+};
+constexpr std::array<Signal, 5> signals{{{"tool_x_m", "p_x (mm)", 1e3, -40, 40, 30},
+                                         {"tool_y_m", "p_y (mm)", 1e3, -20, 30, 20},
+                                         {"force_x_N", "f_x (N)", 1.0, -4, 4, 3},
+                                         {"force_y_N", "f_y (N)", 1.0, -2, 16, 5},
+                                         {"force_y_N", "f_y (N)", 1.0, -0.7, 0.7, 0.5, 4.1, 4.7}}};
+
+// One law's signal over time. Points that couldn't be told apart at half the size aren't drawn.
+Curve curve_of(const Table& table, const Law& law, const Signal& signal) {
+  const std::size_t of = table.column("law"), time = table.column("time_s"), column = table.column(signal.column);
+  Curve curve;
+  double last_t = 0.0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double t = table.number(row, time), value = signal.factor * table.number(row, column);
+    if (table.text(row, of) != law.name || t < signal.from_s || t > signal.to_s) continue;
+    const bool moved = !curve.x.empty() && std::abs(value - curve.y.back()) > 0.004 * (signal.high - signal.low);
+    if (!curve.x.empty() && !moved && t - last_t < 0.01 * (signal.to_s - signal.from_s)) continue;
+    curve.x.push_back(t);
+    curve.y.push_back(value);
+    last_t = t;
+  }
+  return curve;
+}
+
+// Of the force off the wall: where it is least, which is below 0 where the wall pulls.
+Note pull_note(const Curve& f_y) {
+  const auto least = std::ranges::min_element(f_y.y);
+  if (least == f_y.y.end()) return {};
+  const double t = f_y.x[static_cast<std::size_t>(least - f_y.y.begin())];
+  if (!(*least < -nothing_N)) return {4.5, 0.35, "no pull", Note::Side::on, false};
+  return {t, *least, "pull " + number_text(-*least, 3) + " N", Note::Side::right};
+}
+
+// By how much the force swings while the hand rests.
+Note swing_note(double oscillation_N, const Curve& f_y) {
+  const double t = 0.5 * (press_to_s + 0.3 + rub_from_s);
+  if (oscillation_N < nothing_N) return {t + 0.4, 6.0, "steady", Note::Side::on, false};
+  const double most = f_y.y.empty() ? 0.0 : *std::ranges::max_element(f_y.y);
+  return {2.5, most + 3.0, "swings by " + number_text(oscillation_N, 3) + " N", Note::Side::on, false};
+}
+
+Panel panel_of(const Signal& signal, const Curve& curve) {
+  const bool enlarged = &signal == &signals.back();
+  Panel panel{.x_label = enlarged ? "time (s)" : "",
+              .y_label = signal.label,
+              .curves = {curve},
+              .x_low = signal.from_s,
+              .x_high = signal.to_s,
+              .y_low = signal.low,
+              .y_high = signal.high,
+              .x_ticks = {0.0, 1.0, 2.0, 3.0, 4.0, 5.0},
+              .y_ticks = {-signal.tick, 0.0, signal.tick}};
+  if (signal.high > 2.0 * signal.tick) panel.y_ticks = {0.0, signal.tick, 2.0 * signal.tick};
+  if (enlarged) panel.x_ticks = {4.2, 4.4, 4.6};
+  panel.x_spans = {{press_from_s, press_to_s, ""}, {rub_from_s, rub_to_s, ""}, {leave_from_s, leave_to_s, ""}};
+  if (enlarged) panel.x_spans = {{leave_from_s, leave_to_s, ""}};
+  return panel;
+}
+
+}  // namespace
+
+std::string figure5_answer(const json& headline) {
+  const auto newtons = [&headline](const char* key, const char* which) {
+    return headline.at(key).at(which).get<double>();
+  };
+  const auto does = [](double N, const std::string& what, const std::string& what_not) {
+    return N > nothing_N ? what + number_text(N, 3) + " N" : what_not;
+  };
+  const bool neither = newtons("oscillation_N", "23") < nothing_N && newtons("pull_force_N", "23") < nothing_N;
+  return "Resting on the wall, (1) " + does(newtons("oscillation_N", "1"), "swings by ", "is steady") +
+         "; on leaving it, (5) " + does(newtons("pull_force_N", "5"), "pulls with ", "doesn't pull") + "; (23) does " +
+         (neither ? "neither" : "one of these, too");
+}
+
 std::vector<std::string> Figure5::plot(const Table& table, const Options& options,
                                        const std::filesystem::path& out) const {
-  const std::size_t law = table.column("law"), time = table.column("time_s");
   const json told = headline(table, options);
-  const auto newtons = [&told](const char* key, const char* which) { return told.at(key).at(which).get<double>(); };
-  constexpr double nothing_N = 1e-3;
-  const bool neither = newtons("oscillation_N", "23") < nothing_N && newtons("pull_force_N", "23") < nothing_N;
-  char title[160];
-  std::snprintf(title, sizeof title, "At rest (1) swings by %.3g N, on leaving (5) pulls with %.3g N; (23) does %s",
-                newtons("oscillation_N", "1"), newtons("pull_force_N", "5"), neither ? "neither" : "one of these, too");
-  Chart chart{.title = title, .columns = 3, .panel_width = 560, .panel_height = 250, .panels = {}};
-  struct Quantity {
-    const char *column, *label;
-    double factor, low, high;
-  };
-  const std::array<Quantity, 4> quantities{{{"tool_x_m", "p_x (mm)", 1e3, -35, 35},
-                                            {"tool_y_m", "p_y (mm)", 1e3, -15, 25},
-                                            {"force_x_N", "f_x (N)", 1.0, -3, 3},
-                                            {"force_y_N", "f_y (N)", 1.0, -2, 10}}};
-  for (const Quantity& quantity : quantities) {
-    const std::size_t column = table.column(quantity.column);
+  Chart chart{.title = figure5_answer(told),
+              .subtitle = "p: the tool, f: the force on it; x along the wall, y off it. Shaded: press, rub, leave",
+              .columns = 3,
+              .panel_height = 100};
+  for (const Signal& signal : signals) {
     for (const Law& each : laws) {
-      Curve curve;
-      for (std::size_t row = 0; row < table.rows(); ++row) {
-        if (table.text(row, law) != each.name) continue;
-        // Points that couldn't be told apart at half the size aren't drawn.
-        const double t = table.number(row, time), value = quantity.factor * table.number(row, column);
-        const bool moved =
-            !curve.x.empty() && std::abs(value - curve.y.back()) > 0.004 * (quantity.high - quantity.low);
-        if (!curve.x.empty() && !moved && t - curve.x.back() < 0.05) continue;
-        curve.x.push_back(t);
-        curve.y.push_back(value);
+      const Curve curve = curve_of(table, each, signal);
+      Panel panel = panel_of(signal, curve);
+      if (&signal == &signals.front()) {
+        panel.title = "(" + std::string(each.name) + ") " + each.title;
+        panel.x_spans[0].text = "press";
+        panel.x_spans[1].text = "rub";
+        panel.x_spans[2].text = "leave";
       }
-      chart.panels.push_back({.title = &quantity == &quantities[0] ? "(" + std::string(each.name) + ")" : "",
-                              .x_label = &quantity == &quantities[3] ? "time (s)" : "",
-                              .y_label = quantity.label,
-                              .curves = {curve},
-                              .key = false,
-                              .x_low = 0.0,
-                              .x_high = 5.0,
-                              .y_low = quantity.low,
-                              .y_high = quantity.high});
+      if (&signal == &signals[3]) {
+        panel.notes = {swing_note(told.at("oscillation_N").at(each.name).get<double>(), curve)};
+      }
+      if (&signal == &signals.back()) {
+        panel.title = "leaving, enlarged";
+        panel.notes = {pull_note(curve)};
+      }
+      chart.panels.push_back(panel);
     }
   }
   const std::string warning = draw(chart, out / "figure5.svg");

@@ -35,4 +35,7 @@ class Figure5 final : public Study {
   std::string text(const nlohmann::json& headline) const override;
 };
 
+// The plot's title, of the study's headline.
+std::string figure5_answer(const nlohmann::json& headline);
+
 }  // namespace proxarm::studies

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "controller/studies/common/chart.hpp"
+#include "controller/studies/common/chart_page.hpp"
 #include "controller/studies/stress/globe_mesh.hpp"
 #include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
@@ -23,8 +25,8 @@ using nlohmann::json;
 using scenes::Scene;
 using Clock = std::chrono::steady_clock;
 
-constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
-constexpr double K = 1e6;  // 1 kg at 1 ms
+constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
+constexpr double coupling_N_per_m = 1e6;  // 1 kg at 1 ms
 
 double elapsed_ns(Clock::time_point begun) {
   return std::chrono::duration<double, std::nano>(Clock::now() - begun).count();
@@ -35,18 +37,18 @@ double elapsed_ns(Clock::time_point begun) {
 double step_ns(models::GeometricAlgorithm<3>& g, const Vec3& at, const Vec3& push, int steps) {
   double best = std::numeric_limits<double>::infinity();
   for (int round = 0; round < 40; ++round) {
-    Vec3 q = g(K, at, at);
+    Vec3 q = g(coupling_N_per_m, at, at);
     const auto begun = Clock::now();
     for (int k = 0; k < steps; ++k) {
       const double angle = 0.01 * k;
       const Vec3 ahead(2e-6 * std::cos(angle), 2e-6 * std::sin(angle), 0.0);
       g.set_time({1e-3 * k, 1e-3});
-      q = g(K, q + ahead + push, q);
+      q = g(coupling_N_per_m, q + ahead + push, q);
     }
     best = std::min(best, elapsed_ns(begun) / steps);
     // Free space: the push alone leads 5 µm further down in each step.
     const bool fell = push.z() < 0.0 && at.z() - q.z() > 0.5 * steps * std::abs(push.z());
-    if (!q.allFinite() || fell) return nan_value;
+    if (!q.allFinite() || fell) return not_measured;
   }
   return best;
 }
@@ -171,7 +173,7 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
     const CycleSetup& setup = cycle_setups[job - first];
     const CycleCounts c = cycles_(setup);
     const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
-    return {{"cycle", setup.name, number(c.steps), nan_value, nan_value, nan_value, nan_value, nan_value,
+    return {{"cycle", setup.name, number(c.steps), not_measured, not_measured, not_measured, not_measured, not_measured,
              number(c.programs), number(c.limited), number(c.joint_steps), number(c.guarded)}};
   }
   const int steps = options.quick ? 500 : 2'000;
@@ -199,17 +201,19 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   const scenes::CompiledScene compiled = scenes::compile(scene);
   const double start_up_us = 1e-3 * elapsed_ns(begun);
   models::GeometricAlgorithm<3>& g = compiled.algorithm<3>();
-  const Vec3 none = Vec3::Zero(), into(0.0, 0.0, -5.0 / K);
+  const Vec3 none = Vec3::Zero(), into(0.0, 0.0, -5.0 / coupling_N_per_m);
   const bool empty = scene.objects.empty();
   const double gap = count > 1.0 && kind == "objects" ? 0.05 * surface.z() : 1e-3;
   const double far = step_ns(g, Vec3(0.3, 0.2, 20.0), none, steps);
   const double near = step_ns(g, surface + Vec3(0.0, 0.0, gap), none, steps);
   // Found from above, since a coarse mesh lies below its sphere.
   const double depth = std::max(0.5 * surface.z(), 1e-3);
-  const Vec3 down = empty ? surface : g(K, surface - depth * Vec3::UnitZ(), surface + 1e-3 * Vec3::UnitZ());
-  const double contact = empty ? nan_value : step_ns(g, down, into, steps);
-  const double all = kind == "option" ? nan_value : all_ns(scene, surface);
-  return {{kind, name, count, far, near, contact, all, start_up_us, nan_value, nan_value, nan_value, nan_value}};
+  const Vec3 down =
+      empty ? surface : g(coupling_N_per_m, surface - depth * Vec3::UnitZ(), surface + 1e-3 * Vec3::UnitZ());
+  const double contact = empty ? not_measured : step_ns(g, down, into, steps);
+  const double all = kind == "option" ? not_measured : all_ns(scene, surface);
+  return {{kind, name, count, far, near, contact, all, start_up_us, not_measured, not_measured, not_measured,
+           not_measured}};
 }
 
 json Skip::headline(const Table& table, const Options& /*options*/) const {
@@ -267,50 +271,89 @@ json Skip::headline(const Table& table, const Options& /*options*/) const {
 
 namespace {
 
-// The longest steps of any world, and the largest one.
-std::string skip_answer(const Table& table) {
-  double far_ns = 0.0, contact_ns = 0.0, objects = 0.0, triangles = 0.0;
+// Of the worlds of one kind, by their number of objects or triangles.
+struct Cost {
+  double free_ns = 0.0, contact_ns = 0.0, all_ns = 0.0;
+};
+using CostByCount = std::map<double, Cost>;
+
+CostByCount costs_of(const Table& table, const char* kind) {
+  CostByCount costs;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string& kind = table.text(row, table.column("kind"));
-    if (kind != "objects" && kind != "triangles") continue;
-    double& most = kind == "objects" ? objects : triangles;
-    most = std::max(most, table.number(row, table.column("count")));
-    far_ns = std::max(far_ns, table.number(row, table.column("far_ns")));
-    contact_ns = std::max(contact_ns, table.number(row, table.column("contact_ns")));
+    if (table.text(row, table.column("kind")) != kind) continue;
+    const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
+    costs[value("count")] = {std::max(value("far_ns"), value("near_ns")), value("contact_ns"), value("all_ns")};
   }
-  char title[160];
-  std::snprintf(title, sizeof title,
-                "A step far from up to %.0f objects or %.0f triangles takes at most %.0f ns, in contact %.0f ns",
-                objects, triangles, far_ns, contact_ns);
-  return title;
+  return costs;
+}
+
+std::string ns_text(double ns) { return count_text(ns) + " ns"; }
+
+// Three curves, each with its name beside it, and rings at the largest world and where a step takes longest.
+Panel cost_panel(const CostByCount& costs, const char* title, const char* what) {
+  Panel panel{.title = title,
+              .x_label = std::string("number of ") + what,
+              .y_label = "time (ns)",
+              .log_x = true,
+              .log_y = true,
+              .y_low = 5.0,
+              .y_high = 1e6,
+              .y_ticks = {10.0, 100.0, 1e3, 1e4, 1e5, 1e6}};
+  Curve free{.name = "step in free space, far or near", .style = 0, .marks = true};
+  Curve contact{.name = "step in contact, sliding", .style = 2, .marks = true};
+  Curve all{.name = "for comparison: distance to the nearest", .style = 7, .marks = true};
+  for (const auto& [count, cost] : costs) {
+    for (Curve* curve : {&free, &contact, &all}) curve->x.push_back(count);
+    free.y.push_back(cost.free_ns);
+    contact.y.push_back(cost.contact_ns);
+    all.y.push_back(cost.all_ns);
+  }
+  panel.curves = {free, contact, all};
+  if (costs.empty()) return panel;
+  const auto& [largest, last] = *costs.rbegin();
+  panel.x_low = 0.15 * costs.begin()->first;
+  panel.x_high = 4.0 * largest;
+  panel.notes = {{largest, last.free_ns, ns_text(last.free_ns), Note::Side::above},
+                 {largest, last.contact_ns, ns_text(last.contact_ns), Note::Side::above}};
+  const auto longest = std::ranges::max_element(costs, {}, [](const auto& cost) { return cost.second.contact_ns; });
+  if (longest->second.contact_ns > 1.1 * last.contact_ns) {
+    panel.notes.push_back({longest->first, longest->second.contact_ns, "most: " + ns_text(longest->second.contact_ns),
+                           Note::Side::above});
+  }
+  return panel;
+}
+
+// Whether steps in the largest world take less than twice as long as in the smallest.
+bool hardly_grows(const CostByCount& costs) {
+  if (costs.empty()) return true;
+  const Cost &small = costs.begin()->second, &large = costs.rbegin()->second;
+  return large.free_ns < 2.0 * small.free_ns && large.contact_ns < 2.0 * small.contact_ns;
 }
 
 }  // namespace
 
+std::string skip_answer(const Table& table) {
+  const CostByCount objects = costs_of(table, "objects"), triangles = costs_of(table, "triangles");
+  if (objects.empty() || triangles.empty()) return "What a step costs";
+  const auto& [spheres, among] = *objects.rbegin();
+  const auto& [faces, on] = *triangles.rbegin();
+  const bool flat = hardly_grows(objects) && hardly_grows(triangles);
+  return std::string(flat ? "How large the world is hardly matters: a" : "A") + " step takes " +
+         ns_text(among.free_ns) + " free and " + ns_text(among.contact_ns) + " in contact among " +
+         count_text(spheres) + " spheres, " + count_text(on.free_ns) + " and " + ns_text(on.contact_ns) + " among " +
+         count_text(faces) + " triangles";
+}
+
 std::vector<std::string> Skip::plot(const Table& table, const Options& /*options*/,
                                     const std::filesystem::path& out) const {
-  Chart chart{.title = skip_answer(table), .columns = 2, .panel_width = 700, .panel_height = 430, .common_key = true};
-  for (const char* kind : {"objects", "triangles"}) {
-    Panel panel{.title = std::string(kind) == "objects" ? "spheres" : "a mesh",
-                .x_label = std::string("number of ") + kind,
-                .y_label = "time of a step (ns)",
-                .log_x = true,
-                .log_y = true,
-                .y_low = 1.0,
-                .y_high = 1e6};
-    const std::array<const char*, 4> columns{"far_ns", "near_ns", "contact_ns", "all_ns"};
-    const std::array<const char*, 4> names{"far", "near", "in contact, sliding", "evaluating everything"};
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      Curve curve{.name = names[i], .style = static_cast<int>(i), .marks = true};
-      for (std::size_t row = 0; row < table.rows(); ++row) {
-        if (table.text(row, table.column("kind")) != kind) continue;
-        curve.x.push_back(table.number(row, table.column("count")));
-        curve.y.push_back(table.number(row, table.column(columns[i])));
-      }
-      panel.curves.push_back(curve);
-    }
-    chart.panels.push_back(panel);
-  }
+  Chart chart{.title = skip_answer(table),
+              .subtitle = "Distance to the nearest: without contact; of spheres by a tree, of triangles one by one",
+              .columns = 2,
+              .panel_height = 300,
+              .key = true};
+  chart.panels = {cost_panel(costs_of(table, "objects"), "A world of spheres", "spheres"),
+                  cost_panel(costs_of(table, "triangles"), "A world of one mesh", "triangles")};
+  chart.panels[1].y_label.clear();
   const std::string warning = draw(chart, out / "skip.svg");
   return warning.empty() ? std::vector<std::string>{} : std::vector<std::string>{warning};
 }
@@ -338,7 +381,7 @@ std::string Skip::text(const json& headline) const {
   }
   for (const auto& item : headline.at("triangles").items()) {
     const auto ns = [&](const char* key) {
-      return item.value().at(key).is_number() ? item.value().at(key).get<double>() : nan_value;
+      return item.value().at(key).is_number() ? item.value().at(key).get<double>() : not_measured;
     };
     std::snprintf(line, sizeof line, "%6s triangles: far %.1f, near %.1f, in contact %.1f ns; all of them %.0f ns\n",
                   item.key().c_str(), ns("free_ns"), ns("near_ns"), ns("contact_ns"), ns("all_ns"));

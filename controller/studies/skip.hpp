@@ -45,4 +45,7 @@ class Skip final : public Study {
   CycleRun cycles_;
 };
 
+// The plot's title: what a step takes in the largest worlds, and whether their size matters.
+std::string skip_answer(const Table& table);
+
 }  // namespace proxarm::studies

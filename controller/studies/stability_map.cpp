@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "controller/proxies/admittance_proxy.hpp"
-#include "controller/studies/common/chart.hpp"
+#include "controller/studies/stability_plot.hpp"
 #include "models/surfaces/free_space.hpp"
 #include "models/surfaces/plane.hpp"
 
@@ -25,8 +25,6 @@ using models::Vec;
 using nlohmann::json;
 using Vec1 = Vec<1>;
 
-// Sensitivities of the boundary from which on measured and predicted mass aren't compared.
-constexpr double well_conditioned = 3.0;
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
 // Simulates drive, delay and hand of controller/stability/stability.hpp: from the proxy's position to the force that
@@ -414,115 +412,9 @@ json StabilityMap::headline(const Table& table, const Options& /*options*/) cons
         {"d1_error_max", "ideal drive, no delay beyond one period: error of the prediction against K T^2/4 + D T/2"}}}};
 }
 
-namespace {
-
-// What the map says to somebody who asks which mass to choose: with the heavier hand, at 1 ms and the longest delay
-// drawn.
-std::string stability_answer(const Table& table) {
-  const auto value = [&table](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
-  double period_s = 0.0;  // the nearest to 1 ms
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (std::abs(value(row, "period_s") - 1e-3) < std::abs(period_s - 1e-3)) period_s = value(row, "period_s");
-  }
-  std::map<double, double> smallest_kg;  // by the hand's stiffness; below 0: there is none
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (value(row, "order") != 1.0 || value(row, "drive_time_constant_s") != 1.6e-3 || value(row, "delay_s") != 16e-3 ||
-        value(row, "hand_mass_kg") != 1.0 || value(row, "damping_Ns_per_m") != 20.0 ||
-        value(row, "period_s") != period_s) {
-      continue;
-    }
-    smallest_kg[value(row, "stiffness_N_per_m")] = value(row, "predicted_kg");
-  }
-  double enough_kg = 0.0, up_to = 0.0;
-  for (const auto& [stiffness, mass_kg] : smallest_kg) {
-    if (!(mass_kg > 0.0)) break;
-    enough_kg = std::max(enough_kg, mass_kg);
-    up_to = stiffness;
-  }
-  if (!(enough_kg > 0.0)) return "Which mass is stable";
-  char title[160];
-  std::snprintf(
-      title, sizeof title,
-      "At 1 ms and 16 ms of delay %.2g kg bears a hand of 1 kg up to %.0f N/m; stiffer ones swing with any mass",
-      enough_kg, up_to);
-  return title;
-}
-
-}  // namespace
-
-std::vector<std::string> StabilityMap::plot(const Table& table, const Options& options,
+std::vector<std::string> StabilityMap::plot(const Table& table, const Options& /*options*/,
                                             const std::filesystem::path& out) const {
-  const Grid grid(options.quick);
-  const auto value = [&table](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
-  MapChart chart{
-      .title = stability_answer(table),
-      .columns = 3,
-      .z_low = 1e-2,
-      .z_high = 100.0,
-      .contours = {0.01, 0.1, 0.3, 1.0, 3.0, 10.0},
-      .note = "Smallest stable mass in kg, measured (order 1, drives of 100 Hz); grey: none up to 1000 kg is"};
-  const std::vector<double> delays = options.quick ? grid.L : std::vector<double>{0.0, 4e-3, 16e-3};
-  for (const Grip& grip : {Grip{10.0, 0.0}, Grip{20.0, 1.0}}) {
-    for (const double delay : delays) {
-      char title[120];
-      std::snprintf(title, sizeof title, "hand %.0f kg, %.0f Ns/m; delay T + %.0f ms", grip.mass_kg,
-                    grip.damping_Ns_per_m, 1e3 * delay);
-      Map map{.title = title,
-              .x_label = "timestep (ms)",
-              .y_label = "hand's stiffness (N/m)",
-              .log_x = true,
-              .log_y = true,
-              .log_z = true};
-      for (const double T : grid.T) map.x.push_back(1e3 * T);
-      map.y = grid.K;
-      map.z.assign(map.x.size() * map.y.size(), nan_value);
-      for (std::size_t row = 0; row < table.rows(); ++row) {
-        if (value(row, "order") != 1.0 || value(row, "drive_time_constant_s") != 1.6e-3 ||
-            value(row, "delay_s") != delay || value(row, "hand_mass_kg") != grip.mass_kg ||
-            value(row, "damping_Ns_per_m") != grip.damping_Ns_per_m || !(value(row, "predicted_kg") > 0.0)) {
-          continue;
-        }
-        const auto x = std::find(grid.T.begin(), grid.T.end(), value(row, "period_s")) - grid.T.begin();
-        const auto y = std::find(grid.K.begin(), grid.K.end(), value(row, "stiffness_N_per_m")) - grid.K.begin();
-        const auto place = static_cast<std::size_t>(y) * map.x.size() + static_cast<std::size_t>(x);
-        if (place < map.z.size()) map.z[place] = value(row, "measured_kg");
-      }
-      chart.maps.push_back(map);
-    }
-  }
-  double most = 0.0;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const double p = value(row, "predicted_kg"), m = value(row, "measured_kg");
-    if (p > 0.0 && std::isfinite(m) && value(row, "sensitivity") < well_conditioned) {
-      most = std::max(most, std::abs(m / p - 1.0));
-    }
-  }
-  char title[120];
-  std::snprintf(title, sizeof title, "Measured and predicted smallest mass differ by at most %.2g %%", 100.0 * most);
-  Chart agreement{.title = title, .panel_width = 1000, .panel_height = 480};
-  Panel panel{.x_label = "sensitivity of the boundary to the hand's stiffness, |∂ln M/∂ln K|",
-              .y_label = "|measured/predicted − 1|",
-              .log_x = true,
-              .log_y = true,
-              .y_low = 1e-7,
-              .y_high = 1.0};
-  Curve good{.name = "compared", .style = 0, .marks = true, .line = false},
-      bad{.name = "ill-conditioned", .style = 2, .marks = true, .line = false};
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const double p = value(row, "predicted_kg"), m = value(row, "measured_kg"), s = value(row, "sensitivity");
-    if (!(p > 0.0) || !std::isfinite(m) || row % (table.rows() / 2500 + 1) != 0) continue;
-    Curve& curve = s < well_conditioned ? good : bad;
-    curve.x.push_back(std::max(s, 1e-4));
-    curve.y.push_back(std::max(std::abs(m / p - 1.0), 2e-7));
-  }
-  panel.curves = {good, bad, {.name = "2 %", .x = {1e-4, 1e3}, .y = {0.02, 0.02}, .style = 1}};
-  agreement.panels.push_back(panel);
-  std::vector<std::string> warnings;
-  for (const std::string& warning :
-       {draw(chart, out / "stability.svg"), draw(agreement, out / "stability_agreement.svg")}) {
-    if (!warning.empty()) warnings.push_back(warning);
-  }
-  return warnings;
+  return draw_stability(table, out);
 }
 
 std::string StabilityMap::text(const json& headline) const {

@@ -1,5 +1,7 @@
-// Charts of the studies: panels of curves with labelled axes, and maps of numbers as colours. Curves differ in dash,
-// width and mark as well as in colour.
+// Charts of the studies: panels of curves with labelled axes, and maps of numbers as colours (map_chart.hpp). Curves
+// differ in dash, width and mark as well as in colour.
+//
+// A chart answers one question. Its title is the answer; what answers it is marked in the picture by a note.
 #pragma once
 
 #include <filesystem>
@@ -14,48 +16,57 @@ struct Curve {
   int style = 0;       // curves of one style look the same; any number from 0
   bool marks = false;  // a mark at each point, on top of the line
   bool line = true;
+  bool fill = false;  // shaded from the bottom up to the curve
+  double mark_size = 0.9;
+};
+
+// Words at a point of the data.
+struct Note {
+  enum class Side : unsigned char { right, left, above, below, on };
+  double x = 0.0, y = 0.0;
+  std::string text{};
+  Side side = Side::right;  // of the point
+  bool ring = true;         // around the point
+};
+
+// A line across the panel at one value of y, or of x.
+struct Level {
+  double at = 0.0;
+  std::string text{};  // right of it; of a line at one x: beside its upper end
+};
+
+// A shaded part of the panel between two values of x, or of y.
+struct Span {
+  double from = 0.0, to = 0.0;
+  std::string text{};  // inside, at its upper end
 };
 
 struct Panel {
   std::string title{}, x_label{}, y_label{};
   bool log_x = false, log_y = false;
   std::vector<Curve> curves{};
-  bool key = true;
   double x_low = 0.0, x_high = 0.0;  // equal: as the data are
   double y_low = 0.0, y_high = 0.0;
-  std::vector<std::string> x_names{};  // x counts these, from 0
-  std::vector<double> levels{};        // of y: each a faint line with its value in per cent
+  std::vector<std::string> x_names{};        // x counts these, from 0
+  std::vector<double> x_ticks{}, y_ticks{};  // none: gnuplot's choice
+  std::vector<Level> levels{}, uprights{};   // of y, of x
+  std::vector<Span> x_spans{}, y_spans{};    // of x, of y
+  std::vector<Note> notes{};
+  std::string title_colour = "ink";  // of the palette
 };
 
 struct Chart {
-  std::string title{};
-  int columns = 1;  // panels side by side
-  int panel_width = 900, panel_height = 420;
+  std::string title{};      // the answer; long ones take several lines
+  std::string subtitle{};   // of what it is the answer
+  int columns = 1;          // panels side by side
+  int width = 1000;         // of all of it
+  int panel_height = 300;   // of a panel's frame
+  bool first_wide = false;  // the first panel has a row of its own
   std::vector<Panel> panels{};
-  // One key for all panels below them, of the first panel's curves.
-  bool common_key = false;
+  bool key = false;  // below them, of all curves' names
 };
 
 // Writes the SVG. Returns a warning in one line where that didn't work; empty when it did.
 [[nodiscard]] std::string draw(const Chart& chart, const std::filesystem::path& svg);
-
-// z over x and y, each a grid's lines; values that aren't finite stay grey.
-struct Map {
-  std::string title{}, x_label{}, y_label{};  // what z is stands in the chart's title
-  bool log_x = false, log_y = false, log_z = false;
-  std::vector<double> x{}, y{};  // rising
-  std::vector<double> z{};       // x changes first
-};
-
-struct MapChart {
-  std::string title{};
-  int columns = 1;
-  std::vector<Map> maps{};
-  double z_low = 0.0, z_high = 0.0;  // equal: as the data are
-  std::vector<double> contours{};    // values of z at which lines are drawn, each with its value where there is room
-  std::string note{};                // below: what grey is
-};
-
-[[nodiscard]] std::string draw(const MapChart& chart, const std::filesystem::path& svg);
 
 }  // namespace proxarm::studies

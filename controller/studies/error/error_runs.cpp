@@ -167,6 +167,16 @@ Spread speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals) {
 
 Spread speedup_over(const Runs& ours, const Runs& rival) { return speedup(ours, {&rival}); }
 
+AtOneMs best_at_1_ms(const std::vector<Runs>& list, const std::string& method) {
+  AtOneMs best{infinity, 0.0};
+  for (const Runs& runs : list) {
+    if (runs.method != method) continue;
+    const std::size_t i = runs.at_1_ms();
+    if (runs.error[i].median < best.error_m) best = {runs.error[i].median, runs.cost_ns[i] / runs.steps[i]};
+  }
+  return best;
+}
+
 Fit fit_order(const Runs& runs) {
   std::vector<double> x, y;
   for (std::size_t i = 0; i < runs.T.size(); ++i) {

@@ -56,6 +56,12 @@ const Runs& best_tuned(const std::vector<Runs>& list);
 Spread speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals);
 Spread speedup_over(const Runs& ours, const Runs& rival);
 
+// Of a method on a case: the run with steps of 1 ms whose tuning errs least there. Infinite where none ends.
+struct AtOneMs {
+  double error_m = 0.0, step_ns = 0.0;
+};
+AtOneMs best_at_1_ms(const std::vector<Runs>& list, const std::string& method);
+
 // Slope of log error over log T, where the error is above rounding, and the rms of what is left, in decades.
 struct Fit {
   double order = 0.0, residual = 0.0;

@@ -12,6 +12,7 @@
 
 #include "controller/proxies/pose_proxy.hpp"
 #include "controller/studies/common/chart.hpp"
+#include "controller/studies/common/chart_page.hpp"
 #include "controller/studies/error/error_runs.hpp"
 #include "controller/studies/error/tool_cases.hpp"
 #include "models/rigid/rigid_world.hpp"
@@ -155,59 +156,91 @@ json ToolErrorStudy::headline(const Table& table, const Options& /*options*/) co
 
 namespace {
 
-// How far a tool is from its exact motion at 1 ms, where that is most.
-std::string error_answer(const Table& table) {
-  double place_m = 0.0, turn_rad = 0.0;
+// How far a tool is from its exact motion at the timestep next to 1 ms, where that is most.
+struct WorstTool {
+  double period_s = 0.0, error = 0.0;
+  std::string motion{};
+};
+
+WorstTool worst_tool(const Table& table, const char* error) {
+  WorstTool worst;
+  const std::size_t period = table.column("period_s");
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (std::abs(table.number(row, table.column("period_s")) - 1e-3) > 1e-4) continue;
-    place_m = std::max(place_m, table.number(row, table.column("place_error_m")));
-    turn_rad = std::max(turn_rad, table.number(row, table.column("turn_error_rad")));
+    const double T = table.number(row, period);
+    if (std::abs(T - 1e-3) < std::abs(worst.period_s - 1e-3)) worst.period_s = T;
   }
-  char title[160];
-  std::snprintf(title, sizeof title, "At 1 ms a rigid tool is within %.2g µm and %.2g mrad (rms) of its exact motion",
-                1e6 * place_m, 1e3 * turn_rad);
-  return title;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double e = table.number(row, table.column(error));
+    if (table.number(row, period) != worst.period_s || !(e > worst.error)) continue;
+    worst.error = e;
+    worst.motion = table.text(row, table.column("case"));
+  }
+  return worst;
 }
 
-}  // namespace
+std::string motion_title(const std::string& name) {
+  for (const ToolCase& which : tool_cases()) {
+    if (which.name == name) return which.title;
+  }
+  return name;
+}
 
-std::vector<std::string> ToolErrorStudy::plot(const Table& table, const Options& /*options*/,
-                                              const std::filesystem::path& out) const {
-  constexpr double least = 1.2e-10;
-  Panel place{.title = "Place of the reference point (at the bottom: exact)",
+// An error of so little is rounding, and drawn below.
+constexpr double least_tool_error = 1e-10, drawn_least = 2.5e-12, tool_bottom = 1e-12;
+
+Panel tool_panel(const Table& table, const char* error, const char* title, const char* unit) {
+  Panel panel{.title = title,
               .x_label = "timestep (ms)",
-              .y_label = "rms error (m)",
+              .y_label = std::string("rms error (") + unit + ")",
               .log_x = true,
               .log_y = true,
               .x_low = 0.1,
               .x_high = 20.0,
-              .y_low = 1e-10,
-              .y_high = 1e-2};
-  Panel turn = place;
-  turn.title = "Orientation";
-  turn.y_label = "rms error (rad)";
+              .y_low = tool_bottom,
+              .y_high = 1.0,
+              .x_ticks = {0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0},
+              .y_ticks = {1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 1.0},
+              .y_spans = {{tool_bottom, least_tool_error, "rounding"}}};
   int style = 0;
   for (const ToolCase& which : tool_cases()) {
-    Curve of_place{.name = which.title, .style = style++, .marks = true};
-    Curve of_turn = of_place;
+    // The first one is larger, since others may lie upon it.
+    Curve curve{.name = which.title, .style = style, .marks = true, .mark_size = style == 0 ? 1.5 : 0.9};
+    ++style;
     for (std::size_t row = 0; row < table.rows(); ++row) {
       if (table.text(row, table.column("case")) != which.name) continue;
-      const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
-      of_place.x.push_back(1e3 * value("period_s"));
-      of_turn.x.push_back(1e3 * value("period_s"));
-      of_place.y.push_back(std::max(value("place_error_m"), least));
-      of_turn.y.push_back(std::max(value("turn_error_rad"), least));
+      const double e = table.number(row, table.column(error));
+      curve.x.push_back(1e3 * table.number(row, table.column("period_s")));
+      curve.y.push_back(e < least_tool_error ? drawn_least : e);
     }
-    place.curves.push_back(of_place);
-    turn.curves.push_back(of_turn);
+    panel.curves.push_back(curve);
   }
-  const std::string warning = draw({.title = error_answer(table),
-                                    .columns = 2,
-                                    .panel_width = 640,
-                                    .panel_height = 460,
-                                    .panels = {place, turn},
-                                    .common_key = true},
-                                   out / "error_tools.svg");
+  const WorstTool worst = worst_tool(table, error);
+  panel.uprights = {{1e3 * worst.period_s, ""}};
+  if (worst.error > least_tool_error) {
+    const bool turns = std::string(unit) == "rad";
+    panel.notes = {{1e3 * worst.period_s, worst.error,
+                    number_text((turns ? 1e3 : 1e6) * worst.error, 2) + (turns ? " mrad" : " µm"), Note::Side::above}};
+  }
+  return panel;
+}
+
+}  // namespace
+
+std::string tool_error_answer(const Table& table) {
+  const WorstTool place = worst_tool(table, "place_error_m"), turn = worst_tool(table, "turn_error_rad");
+  const bool same = place.motion == turn.motion;
+  return "At " + number_text(1e3 * place.period_s, 2) + " ms a rigid tool is within " +
+         number_text(1e6 * place.error, 2) + " µm and " + number_text(1e3 * turn.error, 2) +
+         " mrad (rms) of its exact motion; worst: " + motion_title(place.motion) +
+         (same ? "" : " (place), " + motion_title(turn.motion) + " (orientation)");
+}
+
+std::vector<std::string> ToolErrorStudy::plot(const Table& table, const Options& /*options*/,
+                                              const std::filesystem::path& out) const {
+  Chart chart{.title = tool_error_answer(table), .columns = 2, .panel_height = 330, .key = true};
+  chart.panels = {tool_panel(table, "place_error_m", "Place of the reference point", "m"),
+                  tool_panel(table, "turn_error_rad", "Orientation", "rad")};
+  const std::string warning = draw(chart, out / "error_tools.svg");
   return warning.empty() ? std::vector<std::string>{} : std::vector<std::string>{warning};
 }
 

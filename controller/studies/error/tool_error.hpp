@@ -23,4 +23,7 @@ class ToolErrorStudy final : public Study {
   std::string text(const nlohmann::json& headline) const override;
 };
 
+// The plot's title: what a tool errs by at most with steps of 1 ms, and in which motion.
+std::string tool_error_answer(const Table& table);
+
 }  // namespace proxarm::studies

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "controller/studies/common/chart.hpp"
+#include "controller/studies/common/chart_page.hpp"
 #include "controller/studies/stress/stress_run.hpp"
 
 namespace proxarm::studies {
@@ -155,72 +156,93 @@ std::int64_t violations_in(const Table& table) {
   return violations;
 }
 
-std::string stress_answer(const Table& table) {
-  const std::int64_t violations = violations_in(table);
-  char title[160];
-  std::snprintf(title, sizeof title, "%s of %.3g million steps broke a law",
-                violations == 0 ? "None" : std::to_string(violations).c_str(),
-                1e-6 * static_cast<double>(sum(table, "steps")));
-  return title;
+// How far one step's force would carry the proxy, T²F/M: decades, of which each run belongs to one.
+struct Bin {
+  double push_m = 0.0, steps = 0.0, violations = 0.0;
+  std::array<double, 4> met{};
+};
+constexpr std::array met_names{"contact_steps", "slipping_steps", "several", "unresolved"};
+
+std::vector<Bin> bins_of(const Table& table) {
+  constexpr int count = 24;
+  constexpr double low = -16.0, high = 8.0;
+  std::vector<Bin> bins(count);
+  for (int i = 0; i < count; ++i) {
+    bins[static_cast<std::size_t>(i)].push_m = std::pow(10.0, low + (high - low) * (i + 0.5) / count);
+  }
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
+    const double T = value("period_s"), push_m = T * T * value("force_N") / value("mass_kg");
+    const int place = std::clamp(static_cast<int>((std::log10(push_m) - low) / (high - low) * count), 0, count - 1);
+    Bin& bin = bins[static_cast<std::size_t>(place)];
+    bin.steps += value("steps");
+    for (std::size_t i = 0; i < met_names.size(); ++i) bin.met[i] += value(met_names[i]);
+    for (const char* name : invariant_names) bin.violations += value(name);
+  }
+  std::erase_if(bins, [](const Bin& bin) { return !(bin.steps > 0.0); });
+  return bins;
 }
 
-// Shares of steps over the push per step, T²F/M: how far the tool is ahead of the proxy. Where no step broke a law, the
-// share that is excluded with 95 %, 3/n, stands for it.
+// Shares of steps. Where no step broke a law, the share that is excluded with 95 %, 3/n, is the top of a shaded band.
 Panel stress_panel(const Table& table) {
-  constexpr int bins = 24;
-  constexpr double low = -16.0, high = 8.0;
-  constexpr std::array names{"steps", "contact_steps", "slipping_steps", "several", "unresolved"};
-  constexpr std::array labels{"", "in contact", "slipping", "several solutions", "unresolved"};
-  std::array<std::array<double, names.size() + 1>, bins> sums{};  // the last: violations
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const double T = table.number(row, table.column("period_s"));
-    const double push = T * T * table.number(row, table.column("force_N")) / table.number(row, table.column("mass_kg"));
-    const int bin = std::clamp(static_cast<int>((std::log10(push) - low) / (high - low) * bins), 0, bins - 1);
-    auto& of = sums[static_cast<std::size_t>(bin)];
-    for (std::size_t i = 0; i < names.size(); ++i) of[i] += table.number(row, table.column(names[i]));
-    for (const char* name : invariant_names) of.back() += table.number(row, table.column(name));
-  }
-  Panel panel{.title = "What steps met, by how far one pushes",
-              .x_label = "T²F/M (m)",
+  Panel panel{.x_label = "how far the force would carry the proxy in a step, T²F/M (m)",
               .y_label = "share of steps",
               .log_x = true,
-              .log_y = true,
-              .curves = {}};
-  for (std::size_t i = 1; i < names.size(); ++i) {
-    panel.curves.push_back({.name = labels[i], .style = std::array{0, 0, 4, 5, 3}[i], .marks = true});
+              .log_y = true};
+  constexpr std::array titles{"in contact", "slipping", "several lawful solutions",
+                              "unresolved: the step itself says that no contacts fit; judged no further"};
+  Curve bound{.fill = true};
+  Curve broke{.name = "broke a law", .style = 2, .marks = true, .line = false, .mark_size = 1.4};
+  std::vector<Curve> met;
+  constexpr std::array styles{0, 4, 5, 3};
+  for (std::size_t i = 0; i < titles.size(); ++i) {
+    met.push_back({.name = titles[i], .style = styles[i], .marks = true});
   }
-  Curve broke{.name = "broke a law", .style = 2, .marks = true, .line = false};
-  Curve none{.name = "none broke a law: fewer than this (95 %)", .style = 1};
   double least = 1.0;
-  for (int bin = 0; bin < bins; ++bin) {
-    const auto& of = sums[static_cast<std::size_t>(bin)];
-    const double x = std::pow(10.0, low + (high - low) * (bin + 0.5) / bins);
-    const auto add = [&](Curve& curve, double share) {
-      if (!(share > 0.0)) return;
-      curve.x.push_back(x);
-      curve.y.push_back(share);
-      least = std::min(least, share);
+  for (const Bin& bin : bins_of(table)) {
+    const auto add = [&](Curve& curve, double steps) {
+      if (!(steps > 0.0)) return;
+      curve.x.push_back(bin.push_m);
+      curve.y.push_back(std::min(1.0, steps / bin.steps));
+      least = std::min(least, steps / bin.steps);
     };
-    if (!(of[0] > 0.0)) continue;
-    for (std::size_t i = 1; i < names.size(); ++i) add(panel.curves[i - 1], of[i] / of[0]);
-    add(of.back() > 0.0 ? broke : none, (of.back() > 0.0 ? of.back() : 3.0) / of[0]);
+    for (std::size_t i = 0; i < met.size(); ++i) add(met[i], bin.met[i]);
+    add(bin.violations > 0.0 ? broke : bound, bin.violations > 0.0 ? bin.violations : 3.0);
   }
+  panel.y_low = std::pow(10.0, std::floor(std::log10(least)) - 1.0);
+  panel.y_high = 2.0;
+  if (!bound.x.empty()) {
+    panel.notes.push_back({std::sqrt(bound.x.front() * bound.x.back()), 4.0 * panel.y_low,
+                           "none broke a law: fewer than this share (95 %)", Note::Side::on, false});
+  }
+  panel.curves.push_back(bound);
+  panel.curves.insert(panel.curves.end(), met.begin(), met.end());
   panel.curves.push_back(broke);
-  panel.curves.push_back(none);
-  panel.y_low = std::pow(10.0, std::floor(std::log10(least)));
-  panel.y_high = 1.5;
   return panel;
 }
 
 }  // namespace
 
+std::string stress_answer(const Table& table) {
+  const std::int64_t violations = violations_in(table), unresolved = sum(table, "unresolved");
+  const auto steps = static_cast<double>(sum(table, "steps"));
+  const std::string of = steps < 1e6 ? count_text(steps) : number_text(1e-6 * steps, 3) + " million";
+  return (violations == 0 ? "None" : count_text(static_cast<double>(violations))) + " of " + of +
+         " random steps broke a law" +
+         (unresolved == 0
+              ? ""
+              : "; " + number_text(100.0 * static_cast<double>(unresolved) / steps, 2) + " % stayed unresolved");
+}
+
 std::vector<std::string> Stress::plot(const Table& table, const Options& /*options*/,
                                       const std::filesystem::path& out) const {
-  Chart chart{.title = stress_answer(table),
-              .panel_width = 1100,
-              .panel_height = 520,
-              .panels = {stress_panel(table)},
-              .common_key = true};
+  const Chart chart{.title = stress_answer(table),
+                    .subtitle =
+                        "Laws: finite; inside of nothing; no pull, within the friction cone, against the slip; "
+                        "the same with another stiffness; no energy out of contacts",
+                    .panel_height = 380,
+                    .panels = {stress_panel(table)},
+                    .key = true};
   const std::string warning = draw(chart, out / (name() + ".svg"));
   return warning.empty() ? std::vector<std::string>{} : std::vector<std::string>{warning};
 }

@@ -52,4 +52,7 @@ class Stress final : public Study {
   Worlds worlds_;
 };
 
+// The plot's title: how many steps broke a law, and how many weren't judged.
+std::string stress_answer(const Table& table);
+
 }  // namespace proxarm::studies

@@ -1,0 +1,57 @@
+// What charts and maps share: the page with its title, and where on it panels are. Lengths in pixels from the top left.
+#pragma once
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+namespace proxarm::studies {
+
+// A gnuplot string in which nothing is special.
+std::string plain(const std::string& text);
+// The same in bold.
+std::string bold(const std::string& text);
+
+// Lines below each other.
+std::string stacked(const std::vector<std::string>& lines);
+
+// Lines of at most `width` letters each, broken at blanks, but not behind a number.
+std::vector<std::string> wrapped(const std::string& text, std::size_t width);
+
+// "0.98", "1360": so many digits that count, without an exponent where the number isn't below a thousandth.
+std::string number_text(double value, int digits);
+
+// "10,000"
+std::string count_text(double count);
+
+// Letters of an UTF-8 text.
+std::size_t letters(const std::string& text);
+
+// "'#17202a'": a colour of the palette on white, for gnuplot's rgb.
+std::string rgb(const char* name);
+
+// A panel's frame.
+struct Frame {
+  double left = 0.0, top = 0.0, right = 0.0, bottom = 0.0;
+};
+
+class Page {
+ public:
+  Page(const std::string& title, const std::string& subtitle, int width);
+  // Where panels may begin.
+  [[nodiscard]] double top() const noexcept { return top_; }
+  // Begins the script of a page of that height, with its title.
+  void begin(std::ostream& gp, double height);
+  // What follows is drawn into this frame.
+  void set_frame(std::ostream& gp, const Frame& frame) const;
+  // Shares of the page, as gnuplot's `screen` has them.
+  [[nodiscard]] double screen_x(double x) const noexcept { return x / width_; }
+  [[nodiscard]] double screen_y(double y) const noexcept { return 1.0 - y / height_; }
+
+ private:
+  int width_;
+  std::vector<std::string> title_, subtitle_;
+  double top_ = 0.0, height_ = 1.0;
+};
+
+}  // namespace proxarm::studies

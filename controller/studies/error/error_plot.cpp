@@ -1,0 +1,326 @@
+#include "controller/studies/error/error_plot.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "controller/studies/common/chart.hpp"
+#include "controller/studies/common/chart_page.hpp"
+#include "controller/studies/error/error_cases.hpp"
+#include "controller/studies/error/error_methods.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+// An error of so little is rounding, and drawn below; one of more than a metre isn't drawn.
+constexpr double rounding_m = 1e-10, drawn_rounding_m = 3e-11, bottom_m = 1e-11, top_m = 1.0;
+
+double drawn_error(double error_m) { return error_m < rounding_m ? drawn_rounding_m : error_m; }
+
+constexpr std::array<const char*, method_count> method_titles{
+    "order 1: eq. (26)",  "order 2", "penalty, semi-implicit Euler", "penalty, Runge-Kutta", "penalty, implicit Euler",
+    "ROS admittance rule"};
+
+enum Look { look_order_1, look_order_2, look_rival, look_fixed = 7, look_1_ms = 6, look_luck = 4 };
+
+// How many of the coarsest runs err less than a finer one does, by ten times and more: their ends come where all
+// methods are exact, which says nothing about the motion.
+std::size_t lucky_runs(const Runs& ours) {
+  std::size_t lucky = 0;
+  double worst_finer = 0.0;
+  for (std::size_t i = ours.T.size(); i-- > 0;) {
+    const double error = ours.error[i].median;
+    if (error < rounding_m && worst_finer > 10.0 * rounding_m) lucky = std::max(lucky, i + 1);
+    worst_finer = std::max(worst_finer, error);
+  }
+  return lucky;
+}
+
+// What x is: the time of a run, or of a step.
+using Along = double (*)(const Runs&, std::size_t);
+double run_time_us(const Runs& runs, std::size_t i) { return 1e-3 * runs.cost_ns[i]; }
+double timestep_ms(const Runs& runs, std::size_t i) { return 1e3 * runs.T[i]; }
+
+void add_point(Curve& curve, double x, double error_m) {
+  if (!(error_m < top_m)) return;
+  curve.x.push_back(x);
+  curve.y.push_back(drawn_error(error_m));
+}
+
+void add_ours(const Runs& ours, Method method, Along along, Panel& panel) {
+  Curve curve{.name = method_titles[method], .style = method == order_1 ? look_order_1 : look_order_2, .marks = true};
+  if (method == order_2) curve.mark_size = 1.3;  // others may lie upon it
+  Curve luck{.name = "exact by luck: finer steps err more", .style = look_luck, .marks = true, .line = false};
+  const std::size_t lucky = lucky_runs(ours);
+  for (std::size_t i = 0; i < ours.T.size(); ++i) {
+    add_point(i < lucky ? luck : curve, along(ours, i), ours.error[i].median);
+  }
+  panel.curves.push_back(curve);
+  panel.curves.push_back(luck);
+}
+
+// The least error of all the others and their tunings. Over run time: by twentieths of a decade, of what is as fast.
+void add_rivals(const std::vector<Runs>& list, Along along, bool by_time, Panel& panel) {
+  std::map<double, double> least;
+  for (const Runs& runs : list) {
+    if (!is_penalty(runs)) continue;
+    for (std::size_t i = 0; i < runs.T.size(); ++i) {
+      const double x = along(runs, i), key = by_time ? std::round(20.0 * std::log10(x)) / 20.0 : std::log10(x);
+      const auto [place, is_new] = least.emplace(key, runs.error[i].median);
+      if (!is_new) place->second = std::min(place->second, runs.error[i].median);
+    }
+  }
+  Curve curve{.name = "best of the others, tuned to the motion", .style = look_rival};
+  double so_far = std::numeric_limits<double>::infinity();
+  for (const auto& [key, error] : least) {
+    so_far = by_time ? std::min(so_far, error) : error;
+    add_point(curve, std::pow(10.0, key), so_far);
+  }
+  panel.curves.push_back(curve);
+}
+
+void add_fixed(const Runs& one, const Fixed& fixed, Along along, Panel& panel) {
+  Curve curve{
+      .name = "the best of them with one setting for all: " + count_text(fixed.tuning.stiffness_N_per_m) + " N/m",
+      .style = look_fixed,
+      .marks = true};
+  for (std::size_t i = 0; i < one.T.size(); ++i) add_point(curve, along(one, i), one.error[i].median);
+  panel.curves.push_back(curve);
+}
+
+void mark_1_ms(const std::vector<Runs>& list, Along along, Panel& panel) {
+  Curve curve{.name = "steps of 1 ms", .style = look_1_ms, .marks = true, .line = false, .mark_size = 1.2};
+  for (const Method method : {order_1, order_2}) {
+    const Runs& ours = runs_of(list, method_names[method]);
+    const std::size_t i = ours.at_1_ms();
+    add_point(curve, along(ours, i), ours.error[i].median);
+  }
+  panel.curves.push_back(curve);
+}
+
+// "40 times as fast", of order 2 against the best of the others; good: whether it is faster.
+struct Verdict {
+  std::string text{};
+  bool good = false;
+};
+
+Verdict verdict_of(const std::vector<Runs>& list) {
+  const double times = speedup_over_tuned(runs_of(list, method_names[order_2]), list).median;
+  if (!(times > 0.0)) return {"not comparable", false};
+  if (times > 1.0) return {number_text(times, 2) + " × as fast", true};
+  return {number_text(1.0 / times, 2) + " × as long", false};
+}
+
+Panel panel_of(const ErrorCase& which, const std::vector<Runs>& list, const Fixed& fixed, bool by_time) {
+  const Along along = by_time ? run_time_us : timestep_ms;
+  Panel panel{.title = which.title,
+              .y_label = "rms error (m)",
+              .log_x = true,
+              .log_y = true,
+              .y_low = bottom_m,
+              .y_high = top_m,
+              .y_ticks = {1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 1.0},
+              .y_spans = {{bottom_m, rounding_m, "rounding"}}};
+  if (by_time) {
+    const Verdict verdict = verdict_of(list);
+    panel.title += ": " + verdict.text;
+    panel.title_colour = verdict.good ? "good" : "bad";
+    panel.y_spans.push_back({1e-6, 1e-3, ""});
+  }
+  for (const Method method : {order_2, order_1}) {
+    add_ours(runs_of(list, method_names[method]), method, along, panel);
+  }
+  add_rivals(list, along, by_time, panel);
+  if (const Runs* one = fixed_runs(list, fixed); one != nullptr && by_time) add_fixed(*one, fixed, along, panel);
+  mark_1_ms(list, along, panel);
+  return panel;
+}
+
+// One range of x for all panels, in whole decades; labels at the outer ones alone.
+void share_x(Chart& chart, const std::string& x_label) {
+  double low = std::numeric_limits<double>::infinity(), high = 0.0;
+  for (const Panel& panel : chart.panels) {
+    for (const Curve& curve : panel.curves) {
+      for (const double x : curve.x) {
+        low = std::min(low, x);
+        high = std::max(high, x);
+      }
+    }
+  }
+  const auto columns = static_cast<std::size_t>(chart.columns);
+  for (std::size_t i = 0; i < chart.panels.size(); ++i) {
+    Panel& panel = chart.panels[i];
+    panel.x_low = std::pow(10.0, std::floor(std::log10(low)));
+    panel.x_high = std::pow(10.0, std::ceil(std::log10(high)));
+    for (double x = panel.x_low; x < 1.1 * panel.x_high; x *= 100.0) panel.x_ticks.push_back(x);
+    if (i + columns >= chart.panels.size()) panel.x_label = x_label;
+    if (i % columns != 0) panel.y_label.clear();
+  }
+}
+
+Chart case_panels(const RunsByCase& all, bool by_time) {
+  const Fixed fixed = best_fixed(all);
+  Chart chart{.columns = 2, .panel_height = 190, .key = true};
+  for (const ErrorCase& which : error_cases()) {
+    const auto found = all.find(which.name);
+    if (found != all.end()) chart.panels.push_back(panel_of(which, found->second, fixed, by_time));
+  }
+  share_x(chart, by_time ? "run time of the motion (µs)" : "timestep (ms)");
+  return chart;
+}
+
+// Of a method over all motions with steps of 1 ms: where it errs most, and what its steps take.
+struct Worst {
+  double error_m = 0.0, least_ns = std::numeric_limits<double>::infinity(), most_ns = 0.0;
+  std::string motion{};
+};
+
+Worst worst_of(const RunsByCase& all, Method method) {
+  Worst worst;
+  for (const auto& [name, list] : all) {
+    const AtOneMs at = best_at_1_ms(list, method_names[method]);
+    worst.least_ns = std::min(worst.least_ns, at.step_ns);
+    worst.most_ns = std::max(worst.most_ns, at.step_ns);
+    if (at.error_m > worst.error_m) {
+      worst.error_m = at.error_m;
+      worst.motion = name;
+    }
+  }
+  return worst;
+}
+
+// The penalty method that errs least where it errs most.
+Method best_penalty(const RunsByCase& all) {
+  Method best = penalty_euler;
+  for (const Method method : {penalty_rk4, penalty_implicit}) {
+    if (worst_of(all, method).error_m < worst_of(all, best).error_m) best = method;
+  }
+  return best;
+}
+
+std::string micrometres(double m) { return number_text(1e6 * m, 3) + " µm"; }
+
+std::string nanoseconds(const Worst& worst) {
+  return count_text(worst.least_ns) + " to " + count_text(worst.most_ns) + " ns";
+}
+
+// "semi-implicit Euler", of a penalty method.
+std::string short_title(Method method) {
+  const std::string title = method_titles[method];
+  return title.substr(title.find(", ") + 2);
+}
+
+// What the smaller error costs.
+std::string step_answer(const RunsByCase& all) {
+  const Method rival = best_penalty(all);
+  return "A step of order 2 takes " + nanoseconds(worst_of(all, order_2)) + ", of " + short_title(rival) + " " +
+         nanoseconds(worst_of(all, rival));
+}
+
+// Where a method's mark stands among those of a motion.
+double place_of(std::size_t motion, std::size_t method) {
+  return static_cast<double>(motion) + 0.13 * (static_cast<double>(method) - 2.5);
+}
+
+// The motions side by side, a mark for each method.
+Chart at_a_glance(const RunsByCase& all) {
+  Panel error{.title = "Position error with steps of 1 ms, each method tuned to the motion",
+              .y_label = "rms error (m)",
+              .log_y = true,
+              .y_low = bottom_m,
+              .y_high = 0.1,
+              .y_ticks = {1e-10, 1e-8, 1e-6, 1e-4, 1e-2},
+              .y_spans = {{bottom_m, rounding_m, "rounding"}}};
+  Panel time{.title = step_answer(all),
+             .y_label = "time of a step (ns)",
+             .log_y = true,
+             .y_low = 5.0,
+             .y_high = 500.0,
+             .y_ticks = {5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0}};
+  std::map<std::string, std::size_t> places;
+  for (const ErrorCase& which : error_cases()) {
+    if (!all.contains(which.name)) continue;
+    if (places.size() % 2 == 1) {
+      const auto x = static_cast<double>(places.size());
+      error.x_spans.push_back({x - 0.5, x + 0.5, ""});
+    }
+    places[which.name] = error.x_names.size();
+    error.x_names.push_back(which.name);
+    std::ranges::replace(error.x_names.back(), '_', ' ');
+  }
+  time.x_names = error.x_names;
+  time.x_spans = error.x_spans;
+  for (std::size_t method = 0; method < method_count; ++method) {
+    Curve of_error{.name = method_titles[method],
+                   .style = static_cast<int>(method),
+                   .marks = true,
+                   .line = false,
+                   .mark_size = 1.1};
+    Curve of_time = of_error;
+    for (const auto& [name, motion] : places) {
+      const AtOneMs at = best_at_1_ms(all.at(name), method_names[method]);
+      if (!(at.error_m < top_m)) continue;
+      of_error.x.push_back(place_of(motion, method));
+      of_error.y.push_back(drawn_error(at.error_m));
+      of_time.x.push_back(place_of(motion, method));
+      of_time.y.push_back(at.step_ns);
+    }
+    error.curves.push_back(of_error);
+    time.curves.push_back(of_time);
+  }
+  for (const Method method : {order_2, best_penalty(all)}) {
+    const Worst worst = worst_of(all, method);
+    if (!std::isfinite(worst.error_m) || !places.contains(worst.motion)) continue;
+    error.levels.push_back({drawn_error(worst.error_m), micrometres(worst.error_m)});
+    error.notes.push_back({place_of(places[worst.motion], method), drawn_error(worst.error_m), "", Note::Side::above});
+  }
+  return {.title = glance_answer(all), .panel_height = 270, .panels = {error, time}, .key = true};
+}
+
+}  // namespace
+
+std::string work_answer(const RunsByCase& all) {
+  int faster = 0;
+  for (const auto& [name, list] : all) faster += verdict_of(list).good ? 1 : 0;
+  return "For the same error order 2 takes less time than the best of the others, tuned to the motion, in " +
+         std::to_string(faster) + " of " + std::to_string(all.size()) + " motions";
+}
+
+std::string order_answer(const RunsByCase& all) {
+  const auto good = [&all](Method method) {
+    return std::ranges::count_if(all, [method](const auto& motion) {
+      const double order = fit_order(runs_of(motion.second, method_names[method])).order;
+      return order == 0.0 || order > 1.9;
+    });
+  };
+  return "Order 2's error is rounding or falls at least by the timestep's square in " + std::to_string(good(order_2)) +
+         " of " + std::to_string(all.size()) + " motions, order 1's in " + std::to_string(good(order_1));
+}
+
+std::string glance_answer(const RunsByCase& all) {
+  const Method rival = best_penalty(all);
+  return "At 1 ms order 2 errs by at most " + micrometres(worst_of(all, order_2).error_m) +
+         " in every motion, the best penalty method (" + short_title(rival) + ") by up to " +
+         micrometres(worst_of(all, rival).error_m);
+}
+
+std::vector<std::string> draw_errors(const Table& table, const std::filesystem::path& out) {
+  const RunsByCase all = collect(table);
+  Chart work = case_panels(all, true), order = case_panels(all, false), glance = at_a_glance(all);
+  work.title = work_answer(all);
+  work.subtitle =
+      "Others: penalty walls by three integrators and the ROS admittance rule. Compared where both reach errors of "
+      "1 µm to 1 mm (shaded); in a panel's title: order 2 beside the best of them.";
+  order.title = order_answer(all);
+  std::vector<std::string> warnings;
+  for (const auto& [chart, file] :
+       {std::pair{&work, "error.svg"}, std::pair{&order, "error_order.svg"}, std::pair{&glance, "error_at_1ms.svg"}}) {
+    const std::string warning = draw(*chart, out / file);
+    if (!warning.empty()) warnings.push_back(warning);
+  }
+  return warnings;
+}
+
+}  // namespace proxarm::studies

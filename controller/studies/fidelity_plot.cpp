@@ -1,0 +1,217 @@
+#include "controller/studies/fidelity_plot.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "controller/studies/common/chart.hpp"
+#include "controller/studies/common/chart_page.hpp"
+#include "controller/studies/fidelity_bands.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+// What the plots ask about: 10 % at the timestep of most sessions.
+constexpr double asked_limit = 0.1, drawn_period_s = 1e-3;
+
+// A setup that is drawn: its errors by frequency, of the direction in which each is largest, and the rows of these.
+struct Drawn {
+  std::string name{};  // in the key
+  double mass = 0.0;   // or inertia
+  bool looks_ahead = false, torque = false;
+  std::map<double, double> error_of_Hz{};
+  std::map<double, std::size_t> rows{};
+};
+
+bool flag(const Table& table, std::size_t row, const char* name) {
+  return table.number(row, table.column(name)) != 0.0;
+}
+
+// The default cell with its own drives, at the timestep that is drawn.
+bool is_usual(const Table& table, std::size_t row) {
+  return table.text(row, table.column("cell")) == "default" && table.number(row, table.column("drive_factor")) == 1.0 &&
+         table.number(row, table.column("period_s")) == drawn_period_s;
+}
+
+enum class Way { free, wall, turning };
+
+Way way_of(const Table& table, std::size_t row) {
+  if (is_turning(table, row)) return Way::turning;
+  return flag(table, row, "wall") ? Way::wall : Way::free;
+}
+
+// All usual setups of one way, in the order of mass, lookahead, torque.
+std::vector<Drawn> usual_setups(const Table& table, Way way) {
+  const std::size_t error = table.column(way == Way::turning ? "inertia_error" : "mass_error"),
+                    mass = table.column(way == Way::turning ? "inertia_kg_m2" : "mass_kg"),
+                    frequency = table.column("frequency_Hz");
+  std::vector<Drawn> list;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (!is_usual(table, row) || way_of(table, row) != way || !std::isfinite(table.number(row, error))) continue;
+    const Drawn wanted{.mass = table.number(row, mass),
+                       .looks_ahead = flag(table, row, "lookahead"),
+                       .torque = flag(table, row, "torque")};
+    auto at = std::ranges::find_if(list, [&wanted](const Drawn& d) {
+      return d.mass == wanted.mass && d.looks_ahead == wanted.looks_ahead && d.torque == wanted.torque;
+    });
+    if (at == list.end()) at = list.insert(at, wanted);
+    const double f = table.number(row, frequency), e = table.number(row, error);
+    const auto [found, is_new] = at->error_of_Hz.emplace(f, e);
+    if (!is_new && !(e > found->second)) continue;
+    found->second = e;
+    at->rows[f] = row;
+  }
+  std::ranges::sort(list, {}, [](const Drawn& d) { return std::tuple(d.mass, d.looks_ahead, d.torque); });
+  for (Drawn& drawn : list) {
+    drawn.name = number_text(drawn.mass, 3) + (way == Way::turning ? " kg m²" : " kg");
+    if (way == Way::wall) drawn.name += " on the wall";
+    if (drawn.looks_ahead) drawn.name += drawn.torque ? ", lookahead and torque" : ", lookahead";
+  }
+  return list;
+}
+
+// Of the masses the one that was measured with most of lookahead and torque; of several the heaviest.
+std::vector<Drawn> one_mass(const Table& table) {
+  std::vector<Drawn> list = usual_setups(table, Way::free);
+  std::map<double, int> count;
+  for (const Drawn& drawn : list) ++count[drawn.mass];
+  double chosen = 0.0;
+  for (const auto& [mass, setups] : count) {
+    if (chosen == 0.0 || setups >= count.at(chosen)) chosen = mass;
+  }
+  std::erase_if(list, [chosen](const Drawn& drawn) { return drawn.mass != chosen; });
+  return list;
+}
+
+std::string timestep_text() { return "At T = " + number_text(1e3 * drawn_period_s, 3) + " ms "; }
+
+template <typename Value>
+std::vector<Curve> curves_of(const std::vector<Drawn>& setups, int first_style, Value value) {
+  std::vector<Curve> curves;
+  for (const Drawn& drawn : setups) {
+    Curve curve{.name = drawn.name, .style = first_style++, .marks = true};
+    for (const auto& [f, row] : drawn.rows) {
+      curve.x.push_back(f);
+      curve.y.push_back(value(row));
+    }
+    curves.push_back(curve);
+  }
+  return curves;
+}
+
+Panel empty_panel(const std::string& title, const std::string& y_label, double low, double high, bool log) {
+  return {.title = title,
+          .x_label = "frequency (Hz)",
+          .y_label = y_label,
+          .log_x = true,
+          .log_y = log,
+          .x_low = 0.08,
+          .x_high = 40.0,
+          .y_low = low,
+          .y_high = high,
+          .x_ticks = {0.1, 1.0, 10.0}};
+}
+
+// The error in per cent, with the limits, and a ring where 10 % are passed: of each setup, or of the first of all.
+Panel error_panel(const Table& table, const std::vector<Drawn>& setups, bool turning, bool each) {
+  Panel panel = empty_panel(std::string("Error of the ") + (turning ? "inertia" : "mass") + " felt, " +
+                                (turning ? "about the worst axis" : "in the worst direction"),
+                            turning ? "|τ/α − J|/J (%)" : "|F/a − M|/M (%)", 0.05, 1000.0, true);
+  panel.x_ticks = {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0};
+  const std::size_t error = table.column(turning ? "inertia_error" : "mass_error");
+  panel.curves = curves_of(setups, 0, [&](std::size_t row) { return 100.0 * table.number(row, error); });
+  for (const double limit : fidelity_limits) panel.levels.push_back({100.0 * limit, percent_text(limit)});
+  std::set<double> bands;
+  for (const Drawn& drawn : setups) bands.insert(band_Hz(drawn.error_of_Hz, asked_limit));
+  for (const double band : bands) {
+    if (band > 0.0 && band < 0.99 * setups[0].error_of_Hz.rbegin()->first) {
+      const bool last = bands.size() > 1 && band == *bands.rbegin();
+      panel.notes.push_back(
+          {band, 100.0 * asked_limit, number_text(band, 2) + " Hz", last ? Note::Side::below : Note::Side::above});
+    }
+    if (!each) break;
+  }
+  return panel;
+}
+
+// Error, and what is felt in phase and beside it.
+std::vector<Panel> free_panels(const Table& table, const std::vector<Drawn>& setups, bool turning) {
+  const std::string ratio = turning ? "τ/α" : "F/a", asked = turning ? "J" : "M";
+  const std::size_t real = table.column(turning ? "inertia_real_kg_m2" : "mass_real_kg"),
+                    imaginary = table.column(turning ? "inertia_imag_kg_m2" : "mass_imag_kg"),
+                    wanted = table.column(turning ? "inertia_kg_m2" : "mass_kg");
+  const auto value = [&](std::size_t row, std::size_t column) { return table.number(row, column); };
+  Panel size = empty_panel("In phase (below 0: pulls)", "Re(" + ratio + ")/" + asked, -2.0, 3.0, false);
+  Panel phase = empty_panel("Phase (above 0: pushes on)", "arg(" + ratio + ") (°)", -180.0, 180.0, false);
+  phase.y_ticks = {-180.0, -90.0, 0.0, 90.0, 180.0};
+  size.curves = curves_of(setups, 0, [&](std::size_t row) { return value(row, real) / value(row, wanted); });
+  phase.curves = curves_of(setups, 0, [&](std::size_t row) {
+    return 180.0 / std::numbers::pi * std::atan2(value(row, imaginary), value(row, real));
+  });
+  return {error_panel(table, setups, turning, !turning), size, phase};
+}
+
+Panel wall_panel(const Table& table) {
+  const std::size_t stiffness = table.column("stiffness_N_per_m");
+  Panel panel = empty_panel("Leaning on a wall", "|F/x| (N/m)", 1e4, 1e6, true);
+  panel.curves =
+      curves_of(usual_setups(table, Way::wall), 4, [&](std::size_t row) { return table.number(row, stiffness); });
+  if (!panel.curves.empty()) panel.curves[0].mark_size = 1.7;  // others lie upon it
+  return panel;
+}
+
+}  // namespace
+
+std::string fidelity_answer(const Table& table) {
+  const std::vector<Drawn> setups = one_mass(table);
+  if (setups.empty()) return "What the hand feels at the simulated arm";
+  std::string answer =
+      timestep_text() + number_text(setups[0].mass, 3) + " kg feels within " + percent_text(asked_limit);
+  for (const Drawn& drawn : setups) {
+    if (&drawn != &setups[0]) answer += ",";
+    if (drawn.looks_ahead) answer += drawn.torque ? " with lookahead and torque" : " with lookahead";
+    answer += " " + band_text(drawn.error_of_Hz, asked_limit);
+  }
+  return answer + " (worst direction)";
+}
+
+std::string fidelity_turning_answer(const Table& table) {
+  const std::vector<Drawn> setups = usual_setups(table, Way::turning);
+  if (setups.empty()) return "What the hand feels of a tool that it turns";
+  const Drawn& least =
+      *std::ranges::min_element(setups, {}, [](const Drawn& drawn) { return band_Hz(drawn.error_of_Hz, asked_limit); });
+  std::string inertias = number_text(setups.front().mass, 3);
+  if (setups.size() > 1) inertias += " to " + number_text(setups.back().mass, 3);
+  return timestep_text() + inertias + " kg m² " + (setups.size() > 1 ? "feel" : "feels") + " within " +
+         percent_text(asked_limit) + " " + band_text(least.error_of_Hz, asked_limit) + " (worst axis)";
+}
+
+std::vector<std::string> draw_fidelity(const Table& table, const std::filesystem::path& out) {
+  Chart place{.title = fidelity_answer(table),
+              .subtitle = "Default cell, simulated; torque: drives that measure the torque of their gears",
+              .columns = 3,
+              .panel_height = 230,
+              .first_wide = true,
+              .key = true};
+  Chart turning = place;
+  turning.title = fidelity_turning_answer(table);
+  turning.subtitle = "Default cell, simulated; a tool that the hand turns about x, y and z";
+  turning.columns = 2;
+  if (const std::vector<Drawn> setups = one_mass(table); !setups.empty()) {
+    place.panels = free_panels(table, setups, false);
+  }
+  place.panels.push_back(wall_panel(table));
+  if (const std::vector<Drawn> setups = usual_setups(table, Way::turning); !setups.empty()) {
+    turning.panels = free_panels(table, setups, true);
+  }
+  std::vector<std::string> warnings;
+  for (const auto& [chart, file] : {std::pair{&place, "fidelity.svg"}, std::pair{&turning, "fidelity_turning.svg"}}) {
+    const std::string warning = draw(*chart, out / file);
+    if (!warning.empty()) warnings.push_back(warning);
+  }
+  return warnings;
+}
+
+}  // namespace proxarm::studies
