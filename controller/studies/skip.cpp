@@ -298,7 +298,7 @@ Panel cost_panel(const CostByCount& costs, const char* title, const char* what) 
               .log_y = true,
               .y_low = 5.0,
               .y_high = 1e6,
-              .y_ticks = {10.0, 100.0, 1e3, 1e4, 1e5, 1e6}};
+              .y_ticks = {1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8}};
   Curve free{.name = "step in free space, far or near", .style = 0, .marks = true};
   Curve contact{.name = "step in contact, sliding", .style = 2, .marks = true};
   Curve all{.name = "for comparison: distance to the nearest", .style = 7, .marks = true};
@@ -307,6 +307,8 @@ Panel cost_panel(const CostByCount& costs, const char* title, const char* what) 
     free.y.push_back(cost.free_ns);
     contact.y.push_back(cost.contact_ns);
     all.y.push_back(cost.all_ns);
+    panel.y_low = std::min(panel.y_low, 0.5 * cost.free_ns);
+    panel.y_high = std::max({panel.y_high, 2.0 * cost.contact_ns, 2.0 * cost.all_ns});
   }
   panel.curves = {free, contact, all};
   if (costs.empty()) return panel;

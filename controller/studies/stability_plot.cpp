@@ -126,7 +126,7 @@ MapChart stability_chart(const Table& table) {
   MapChart chart{.title = stability_answer(table),
                  .subtitle = "Smallest stable mass, measured (order 1, drives of 100 Hz)",
                  .note = "Grey: no mass up to 1000 kg is stable. Each cell is one grid point, drawn around it.",
-                 .z_label = "smallest stable mass (kg)",
+                 .z_label = "mass (kg)",
                  .z_least = 1e-2,
                  .columns = 3,
                  .x_ticks = {0.25, 0.5, 1.0, 2.0, 4.0, 8.0},
@@ -209,6 +209,7 @@ Chart agreement_chart(const Table& table) {
       .y_ticks = {1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0},
       .levels = {{100.0 * tolerance, "tolerance " + number_text(100.0 * tolerance, 2) + " %"}},
       .uprights = {{well_conditioned, ""}}};
+  for (const Compared& one : all.ill) panel.x_high = std::max(panel.x_high, 1.2 * one.sensitivity);
   if (all.worst.error >= least_y) {
     panel.notes.push_back({std::max(all.worst.sensitivity, least_x), 100.0 * all.worst.error,
                            "most: " + number_text(100.0 * all.worst.error, 2) + " %"});

@@ -128,12 +128,31 @@ void write_points(std::ostream& data, const Curve& curve) {
   data << "\n\n";
 }
 
-std::string drawn_as(const Curve& curve, std::size_t block) {
-  const std::string from = "'data' index " + std::to_string(block) + " using 1:2 with ";
-  if (curve.fill) return from + "filledcurves x1 fc rgb " + rgb("world-bottom") + " fs solid 1.0 noborder";
-  const std::string size = curve.marks ? " ps " + std::to_string(curve.mark_size) : "";
-  return from + (curve.line ? (curve.marks ? "linespoints" : "lines") : "points") + " ls " +
-         std::to_string(style_of(curve)) + size;
+// "with lines ls 2", as gnuplot has it.
+std::string look_of(const Curve& curve, double mark_size) {
+  if (curve.fill) return "with filledcurves x1 fc rgb " + rgb("world-bottom") + " fs solid 1.0 noborder";
+  return std::string("with ") + (curve.line ? (curve.marks ? "linespoints" : "lines") : "points") + " ls " +
+         std::to_string(style_of(curve)) + (curve.marks ? " ps " + std::to_string(mark_size) : "");
+}
+
+// What is plotted of a panel: its curves, and the rings of its notes. Their points go to `data`, whose blocks are
+// counted.
+std::vector<std::string> plots_of(const Panel& panel, std::ostream& data, std::size_t& block) {
+  std::vector<std::string> plots;
+  const auto add = [&](const Curve& curve, const std::string& look) {
+    if (curve.x.empty()) return;
+    write_points(data, curve);
+    plots.push_back("'data' index " + std::to_string(block++) + " using 1:2 " + look + " notitle");
+  };
+  for (const Curve& curve : panel.curves) add(curve, look_of(curve, curve.mark_size));
+  Curve rings;
+  for (const Note& note : panel.notes) {
+    if (!note.ring) continue;
+    rings.x.push_back(note.x);
+    rings.y.push_back(note.y);
+  }
+  add(rings, "with points pt 6 ps 2.2 lw 2.6 lc rgb " + rgb("ink"));
+  return plots;
 }
 
 // Entries of the key, each once, of all panels' curves: gnuplot draws them for the first panel, of no data.
@@ -142,16 +161,9 @@ std::vector<std::string> key_entries(const Chart& chart, std::size_t& longest) {
   std::set<std::string> named;
   for (const Panel& panel : chart.panels) {
     for (const Curve& curve : panel.curves) {
-      if (curve.name.empty() || curve.x.empty() || !named.insert(curve.name).second) continue;
+      if (!chart.key || curve.name.empty() || curve.x.empty() || !named.insert(curve.name).second) continue;
       longest = std::max(longest, letters(curve.name));
-      std::string entry = "NaN with ";
-      if (curve.fill) {
-        entry += "filledcurves x1 fc rgb " + rgb("world-bottom") + " fs solid 1.0 noborder";
-      } else {
-        entry += std::string(curve.line ? (curve.marks ? "linespoints" : "lines") : "points") + " ls " +
-                 std::to_string(style_of(curve)) + (curve.marks ? " ps 1.1" : "");
-      }
-      entries.push_back(entry + " title " + plain(curve.name));
+      entries.push_back("NaN " + look_of(curve, 1.1) + " title " + plain(curve.name));
     }
   }
   return entries;
@@ -239,7 +251,7 @@ void set_panel(std::ostream& gp, const Panel& panel) {
 
 std::string draw(const Chart& chart, const std::filesystem::path& svg) {
   std::size_t longest = 0;
-  const std::vector<std::string> entries = chart.key ? key_entries(chart, longest) : std::vector<std::string>{};
+  const std::vector<std::string> entries = key_entries(chart, longest);
   Page page(chart.title, chart.subtitle, chart.width);
   const Layout layout = layout_of(chart, page.top(), entries.size(), longest);
   std::ostringstream gp, data;
@@ -249,40 +261,19 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
   gp << "set style textbox opaque noborder fillcolor rgb '#ffffff' margins 0.3,0.3\n";
   std::size_t block = 0;
   for (std::size_t i = 0; i < chart.panels.size(); ++i) {
-    const Panel& panel = chart.panels[i];
     page.set_frame(gp, layout.frames[i]);
-    set_panel(gp, panel);
-    std::string plot = "plot ";
-    const auto add = [&plot](const std::string& item) { plot += (plot.size() > 5 ? ", " : "") + item; };
-    for (const Curve& curve : panel.curves) {
-      if (curve.x.empty()) continue;
-      write_points(data, curve);
-      add(drawn_as(curve, block++) + " notitle");
-    }
-    const Curve rings = [&panel] {
-      Curve all;
-      for (const Note& note : panel.notes) {
-        if (!note.ring) continue;
-        all.x.push_back(note.x);
-        all.y.push_back(note.y);
-      }
-      return all;
-    }();
-    if (!rings.x.empty()) {
-      write_points(data, rings);
-      add("'data' index " + std::to_string(block++) + " using 1:2 with points pt 6 ps 2.2 lw 2.6 lc rgb " + rgb("ink") +
-          " notitle");
-    }
+    set_panel(gp, chart.panels[i]);
+    std::vector<std::string> plots = plots_of(chart.panels[i], data, block);
     if (i == 0 && !entries.empty()) {
       gp << "set key at screen 0.5, screen "
          << page.screen_y(layout.key_top + 0.5 * key_line * static_cast<double>(layout.key_rows))
          << " center vertical maxrows " << layout.key_rows << " samplen 3.2 Left reverse font ',15'\n";
-      for (const std::string& entry : entries) add(entry);
+      plots.insert(plots.end(), entries.begin(), entries.end());
     } else {
       gp << "unset key\n";
     }
-    if (plot.size() > 5) gp << plot << "\n";
-    gp << "unset label\n";
+    for (std::size_t k = 0; k < plots.size(); ++k) gp << (k == 0 ? "plot " : ", ") << plots[k];
+    gp << "\nunset label\n";
   }
   gp << "unset multiplot\n";
   return controller::draw_svg("gnuplot", gp.str(), data.str(), svg);

@@ -15,13 +15,20 @@ namespace {
 constexpr double map_left = 92.0, map_right = 14.0, map_above = 56.0, map_between = 44.0, map_below = 68.0,
                  scale_width = 96.0, note_height = 30.0;
 
-std::string palette_steps() {
-  std::string steps;
+// `steps` colours of the palette's map, from its first to its last one, each for one part of the scale.
+std::string palette_steps(int steps) {
   const auto colours = controller::map_colours();
-  for (std::size_t i = 0; i < colours.size(); ++i) {
-    steps += (i == 0 ? "" : ", ") + std::to_string(i) + " '" + colours[i] + "'";
+  std::string text;
+  for (int i = 0; i < steps; ++i) {
+    const double place = static_cast<double>(colours.size() - 1) * (steps > 1 ? i / (steps - 1.0) : 0.5);
+    const auto before = std::min(static_cast<std::size_t>(place), colours.size() - 2);
+    const double share = place - static_cast<double>(before);
+    const controller::Rgb a = controller::on_white(colours[before]), b = controller::on_white(colours[before + 1]);
+    const std::string colour =
+        controller::css({a.r + share * (b.r - a.r), a.g + share * (b.g - a.g), a.b + share * (b.b - a.b)});
+    for (const int end : {i, i + 1}) text += (text.empty() ? "" : ", ") + std::to_string(end) + " '" + colour + "'";
   }
-  return steps;
+  return text;
 }
 
 void set_ticks(std::ostream& gp, char axis, const std::vector<double>& places) {
@@ -68,7 +75,7 @@ void set_map(std::ostream& gp, const MapChart& chart, const Map& map, bool first
      << plain(first ? map.y_label : "") << " offset 0.3,0\n";
   int label = 0;
   for (const Note& note : map.notes) {
-    gp << "set label " << ++label << " " << bold(note.text) << " at first " << note.x << ", first " << note.y
+    gp << "set label " << ++label << " " << bold(note.text) << " at graph 0.5, first " << note.y
        << (note.side == Note::Side::below ? " center front offset 0,-1.3" : " center front offset 0,1.3")
        << " boxed textcolor rgb " << rgb("ink") << "\n";
   }
@@ -94,11 +101,10 @@ Scale scale_of(const MapChart& chart) {
 namespace {
 
 // Colours of half a decade each, with a tick between any two.
-void set_scale(std::ostream& gp, const MapChart& chart, const Scale& scale) {
+void set_scale(std::ostream& gp, const Scale& scale) {
   const auto halves = static_cast<int>(std::lround(2.0 * std::log10(scale.high / scale.low)));
-  gp << "set palette maxcolors " << halves << "\nset palette defined (" << palette_steps()
-     << ")\nset logscale cb\nset cbrange [" << scale.low << ":" << scale.high << "]\nset cblabel "
-     << plain(chart.z_label) << " offset 1,0\nset cbtics (";
+  gp << "set palette defined (" << palette_steps(halves) << ")"
+     << "\nset logscale cb\nset cbrange [" << scale.low << ":" << scale.high << "]\nset cbtics (";
   for (int i = 0; i <= halves; ++i) {
     const double z = scale.low * std::pow(10.0, 0.5 * i);
     gp << (i == 0 ? "" : ", ") << plain((i == 0 && scale.goes_below ? "≤ " : "") + number_text(z, 1)) << " " << z;
@@ -106,52 +112,73 @@ void set_scale(std::ostream& gp, const MapChart& chart, const Scale& scale) {
   gp << ")\n";
 }
 
+// Where maps are on the page.
+struct MapLayout {
+  std::size_t columns, rows;
+  double top, width, frames_end;
+
+  MapLayout(const MapChart& chart, double page_top)
+      : columns(static_cast<std::size_t>(chart.columns)),
+        rows(std::max<std::size_t>(1, (chart.maps.size() + columns - 1) / columns)),
+        top(page_top + map_above),
+        width((chart.width - map_left - scale_width) / static_cast<double>(columns)),
+        frames_end(page_top + static_cast<double>(rows) * (map_above + chart.panel_height) +
+                   static_cast<double>(rows - 1) * map_between) {}
+  [[nodiscard]] Frame frame(const MapChart& chart, std::size_t i) const {
+    const double left = map_left + static_cast<double>(i % columns) * width;
+    const double upper = top + static_cast<double>(i / columns) * (map_above + chart.panel_height + map_between);
+    return {left, upper, left + width - map_right, upper + chart.panel_height};
+  }
+};
+
+// One scale of colours for all maps, below its label.
+void place_scale(std::ostream& gp, const MapChart& chart, const Page& page, const MapLayout& layout) {
+  gp << "set label 1101 " << plain(chart.z_label) << " at screen "
+     << page.screen_x(chart.width - 0.5 * scale_width - 4.0) << ", screen " << page.screen_y(layout.top - 18.0)
+     << " center\nset colorbox user origin screen " << page.screen_x(chart.width - scale_width + 6.0) << ", screen "
+     << page.screen_y(layout.frames_end) << " size screen " << page.screen_x(20.0) << ", screen "
+     << page.screen_y(layout.top) - page.screen_y(layout.frames_end) << "\n";
+}
+
+// The cells, and a white mark with a ring at each note.
+void plot_map(std::ostream& gp, std::ostream& data, const Map& map, std::size_t& block) {
+  data << cells_of(map) << "\n\n";
+  gp << "plot 'data' index " << block++
+     << " using 1:2:3:4:5:6:7 with boxxyerror fillstyle solid 1.0 border lc rgb '#ffffff' lw 0.6 lc palette";
+  if (!map.notes.empty()) {
+    for (const Note& note : map.notes) data << note.x << " " << note.y << "\n";
+    data << "\n\n";
+    const std::string index = std::to_string(block++);
+    gp << ", 'data' index " << index << " using 1:2 with points pt 7 ps 1.5 lc rgb '#ffffff', '' index " << index
+       << " using 1:2 with points pt 6 ps 1.5 lw 2.6 lc rgb " << rgb("ink");
+  }
+  gp << "\nunset label\n";
+}
+
 }  // namespace
 
 std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
-  const auto columns = static_cast<std::size_t>(chart.columns);
-  const std::size_t rows = (chart.maps.size() + columns - 1) / columns;
-  const Scale scale = scale_of(chart);
   Page page(chart.title, chart.subtitle, chart.width);
+  const MapLayout layout(chart, page.top());
+  const double height = layout.frames_end + map_below + note_height;
   std::ostringstream gp, data;
   data.precision(8);
-  const double frames_end = page.top() + static_cast<double>(rows) * (map_above + chart.panel_height) +
-                            static_cast<double>(rows - 1) * map_between;
-  const double height = frames_end + map_below + note_height;
-  const double width = (chart.width - map_left - scale_width) / static_cast<double>(columns);
   page.begin(gp, height);
-  set_scale(gp, chart, scale);
+  set_scale(gp, scale_of(chart));
   gp << "set tics front\nset object 1 rectangle from graph 0, graph 0 to graph 1, graph 1 behind fillcolor rgb "
      << rgb("floor") << " fillstyle solid noborder\nset style textbox opaque noborder fillcolor rgb '#ffffff' margins "
      << "0.4,0.4\nset label 1100 " << plain(chart.note) << " at screen 0.5, screen " << page.screen_y(height - 16.0)
      << " center textcolor rgb " << rgb("ink") << "\nunset key\n";
   std::size_t block = 0;
   for (std::size_t i = 0; i < chart.maps.size(); ++i) {
-    const Map& map = chart.maps[i];
-    const std::size_t row = i / columns, column = i % columns;
-    const double left = map_left + static_cast<double>(column) * width;
-    const double top =
-        page.top() + map_above + static_cast<double>(row) * (map_above + chart.panel_height + map_between);
-    page.set_frame(gp, {left, top, left + width - map_right, top + chart.panel_height});
-    set_map(gp, chart, map, column == 0, i + columns >= chart.maps.size());
-    if (i == 0) {  // one scale of colours for all of them
-      gp << "set colorbox user origin screen " << page.screen_x(chart.width - scale_width + 6.0) << ", screen "
-         << page.screen_y(frames_end) << " size screen " << page.screen_x(20.0) << ", screen "
-         << page.screen_y(page.top() + map_above) - page.screen_y(frames_end) << "\n";
+    page.set_frame(gp, layout.frame(chart, i));
+    set_map(gp, chart, chart.maps[i], i % layout.columns == 0, i + layout.columns >= chart.maps.size());
+    if (i == 0) {
+      place_scale(gp, chart, page, layout);
     } else {
       gp << "unset colorbox\n";
     }
-    data << cells_of(map) << "\n\n";
-    gp << "plot 'data' index " << block++
-       << " using 1:2:3:4:5:6:7 with boxxyerror fillstyle solid 1.0 border lc rgb '#ffffff' lw 0.6 lc palette";
-    if (!map.notes.empty()) {
-      for (const Note& note : map.notes) data << note.x << " " << note.y << "\n";
-      data << "\n\n";
-      const std::string index = std::to_string(block++);
-      gp << ", 'data' index " << index << " using 1:2 with points pt 7 ps 1.5 lc rgb '#ffffff', '' index " << index
-         << " using 1:2 with points pt 6 ps 1.5 lw 2.6 lc rgb " << rgb("ink");
-    }
-    gp << "\nunset label\n";
+    plot_map(gp, data, chart.maps[i], block);
   }
   gp << "unset multiplot\n";
   return controller::draw_svg("gnuplot", gp.str(), data.str(), svg);

@@ -224,59 +224,73 @@ double place_of(std::size_t motion, std::size_t method) {
   return static_cast<double>(motion) + 0.13 * (static_cast<double>(method) - 2.5);
 }
 
-// The motions side by side, a mark for each method.
-Chart at_a_glance(const RunsByCase& all) {
-  Panel error{.title = "Position error with steps of 1 ms, each method tuned to the motion",
-              .y_label = "rms error (m)",
-              .log_y = true,
-              .y_low = bottom_m,
-              .y_high = 0.1,
-              .y_ticks = {1e-10, 1e-8, 1e-6, 1e-4, 1e-2},
-              .y_spans = {{bottom_m, rounding_m, "rounding"}}};
-  Panel time{.title = step_answer(all),
-             .y_label = "time of a step (ns)",
-             .log_y = true,
-             .y_low = 5.0,
-             .y_high = 500.0,
-             .y_ticks = {5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0}};
-  std::map<std::string, std::size_t> places;
+// Motions by their names, from left to right.
+using Places = std::map<std::string, std::size_t>;
+
+// Two panels of the motions side by side, every other one shaded.
+struct Glance {
+  Panel error, time;
+  Places places{};
+};
+
+Glance empty_glance(const RunsByCase& all) {
+  Glance glance{.error = {.title = "Position error with steps of 1 ms, each method tuned to the motion",
+                          .y_label = "rms error (m)",
+                          .log_y = true,
+                          .y_low = bottom_m,
+                          .y_high = top_m,
+                          .y_ticks = {1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 1.0},
+                          .y_spans = {{bottom_m, rounding_m, "rounding"}}},
+                .time = {.title = step_answer(all),
+                         .y_label = "time of a step (ns)",
+                         .log_y = true,
+                         .y_low = 5.0,
+                         .y_high = 500.0,
+                         .y_ticks = {1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3}}};
   for (const ErrorCase& which : error_cases()) {
     if (!all.contains(which.name)) continue;
-    if (places.size() % 2 == 1) {
-      const auto x = static_cast<double>(places.size());
-      error.x_spans.push_back({x - 0.5, x + 0.5, ""});
-    }
-    places[which.name] = error.x_names.size();
-    error.x_names.push_back(which.name);
-    std::ranges::replace(error.x_names.back(), '_', ' ');
+    const std::size_t place = glance.places.size();
+    const auto x = static_cast<double>(place);
+    if (place % 2 == 1) glance.error.x_spans.push_back({x - 0.5, x + 0.5, ""});
+    glance.places[which.name] = place;
+    glance.error.x_names.push_back(which.name);
+    std::ranges::replace(glance.error.x_names.back(), '_', ' ');
   }
-  time.x_names = error.x_names;
-  time.x_spans = error.x_spans;
-  for (std::size_t method = 0; method < method_count; ++method) {
-    Curve of_error{.name = method_titles[method],
-                   .style = static_cast<int>(method),
-                   .marks = true,
-                   .line = false,
-                   .mark_size = 1.1};
-    Curve of_time = of_error;
-    for (const auto& [name, motion] : places) {
-      const AtOneMs at = best_at_1_ms(all.at(name), method_names[method]);
-      if (!(at.error_m < top_m)) continue;
-      of_error.x.push_back(place_of(motion, method));
-      of_error.y.push_back(drawn_error(at.error_m));
-      of_time.x.push_back(place_of(motion, method));
-      of_time.y.push_back(at.step_ns);
-    }
-    error.curves.push_back(of_error);
-    time.curves.push_back(of_time);
+  glance.time.x_names = glance.error.x_names;
+  glance.time.x_spans = glance.error.x_spans;
+  return glance;
+}
+
+// A method's marks.
+void add_method(const RunsByCase& all, std::size_t method, Glance& glance) {
+  Curve error{
+      .name = method_titles[method], .style = static_cast<int>(method), .marks = true, .line = false, .mark_size = 1.1};
+  Curve time = error;
+  for (const auto& [name, motion] : glance.places) {
+    const AtOneMs at = best_at_1_ms(all.at(name), method_names[method]);
+    if (!(at.error_m < top_m)) continue;
+    error.x.push_back(place_of(motion, method));
+    error.y.push_back(drawn_error(at.error_m));
+    time.x.push_back(place_of(motion, method));
+    time.y.push_back(at.step_ns);
+    glance.time.y_low = std::min(glance.time.y_low, 0.8 * at.step_ns);
+    glance.time.y_high = std::max(glance.time.y_high, 1.25 * at.step_ns);
   }
+  glance.error.curves.push_back(error);
+  glance.time.curves.push_back(time);
+}
+
+Chart at_a_glance(const RunsByCase& all) {
+  Glance glance = empty_glance(all);
+  for (std::size_t method = 0; method < method_count; ++method) add_method(all, method, glance);
   for (const Method method : {order_2, best_penalty(all)}) {
     const Worst worst = worst_of(all, method);
-    if (!std::isfinite(worst.error_m) || !places.contains(worst.motion)) continue;
-    error.levels.push_back({drawn_error(worst.error_m), micrometres(worst.error_m)});
-    error.notes.push_back({place_of(places[worst.motion], method), drawn_error(worst.error_m), "", Note::Side::above});
+    if (!std::isfinite(worst.error_m) || !glance.places.contains(worst.motion)) continue;
+    const double error = drawn_error(worst.error_m);
+    glance.error.levels.push_back({error, micrometres(worst.error_m)});
+    glance.error.notes.push_back({place_of(glance.places[worst.motion], method), error, "", Note::Side::above});
   }
-  return {.title = glance_answer(all), .panel_height = 270, .panels = {error, time}, .key = true};
+  return {.title = glance_answer(all), .panel_height = 270, .panels = {glance.error, glance.time}, .key = true};
 }
 
 }  // namespace

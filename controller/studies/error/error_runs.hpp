@@ -13,7 +13,7 @@ namespace proxarm::studies {
 // The runs of one method with one tuning, from coarse to fine.
 struct Runs {
   std::string method{};
-  Tuning tuning;
+  Tuning tuning{};
   std::vector<double> T{}, steps{};
   std::vector<Spread> error{};
   std::vector<double> cost_ns{};
@@ -38,7 +38,7 @@ const Runs& runs_of(const std::vector<Runs>& list, const std::string& method);
 // A penalty method with one tuning for all cases.
 struct Fixed {
   std::string method{};
-  Tuning tuning;
+  Tuning tuning{};
 };
 
 // The method and tuning that is best over all cases together at 0.1 mm: the one with the least geometric mean of run

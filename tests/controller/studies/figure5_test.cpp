@@ -33,5 +33,16 @@ TEST(Figure5, ShowsWhatThePaperShows) {
   EXPECT_LT(figure(headline, "oscillation_N", "23"), 0.1);
 }
 
+TEST(Figure5, ItsTitleSaysWhatEachLawDoes) {
+  const auto headline = [](double swing_1_N, double pull_5_N, double pull_23_N) {
+    return nlohmann::json{{"oscillation_N", {{"1", swing_1_N}, {"5", 0.0}, {"23", 0.0}}},
+                          {"pull_force_N", {{"1", 0.0}, {"5", pull_5_N}, {"23", pull_23_N}}}};
+  };
+  EXPECT_EQ(figure5_answer(headline(9.65, 0.4213, 0.0)),
+            "Resting on the wall, (1) swings by 9.65 N; on leaving it, (5) pulls with 0.421 N; (23) does neither");
+  EXPECT_EQ(figure5_answer(headline(0.0, 0.0, 0.2)),
+            "Resting on the wall, (1) is steady; on leaving it, (5) doesn't pull; (23) does one of these, too");
+}
+
 }  // namespace
 }  // namespace proxarm::studies

@@ -94,5 +94,22 @@ TEST(ToolErrorStudy, ErrorsFallByTheSquareOfTheTimestepAndWhereWaysBendByItself)
   }
 }
 
+TEST(ToolErrorStudy, ItsTitleNamesTheMotionThatErrsMost) {
+  Table table(ToolErrorStudy().columns());
+  const auto add = [&table](const char* name, double period_s, double place_m, double turn_rad) {
+    table.add(0, {std::string(name), 1.0, period_s, place_m, place_m, turn_rad, turn_rad, 0.0, 500.0});
+  };
+  add("tip", 1e-3, 5.6e-6, 4e-4);
+  add("ladder", 1e-3, 3.1e-5, 3.1e-4);
+  add("ladder", 16e-3, 1.0, 1.0);  // not asked about
+  EXPECT_EQ(tool_error_answer(table),
+            "At 1 ms a rigid tool is within 31 µm and 0.4 mrad (rms) of its exact motion; worst: a rod slides down "
+            "between wall and floor (place), a box tips over its edge (orientation)");
+  add("ladder", 1e-3, 3.1e-5, 5e-4);
+  EXPECT_EQ(tool_error_answer(table),
+            "At 1 ms a rigid tool is within 31 µm and 0.5 mrad (rms) of its exact motion; worst: a rod slides down "
+            "between wall and floor");
+}
+
 }  // namespace
 }  // namespace proxarm::studies

@@ -274,6 +274,40 @@ TEST(Stress, WhatGivesEnergyAndCantBeLookedAtAgainIsUnresolved) {
   EXPECT_EQ(run.unresolved, 1);
 }
 
+TEST(Stress, ItsTitleSaysHowManyBrokeALawAndHowManyStayedUnresolved) {
+  const auto table_of = [](double violations, double unresolved) {
+    Table table(Stress().columns());
+    table.add(0, {1.0,
+                  std::string("media"),
+                  3.0,
+                  1.0,
+                  1.0,
+                  1.0,
+                  1e-3,
+                  1.0,
+                  2e6,
+                  1e6,
+                  0.0,
+                  0.0,
+                  unresolved,
+                  0.0,
+                  0.0,
+                  0.0,
+                  0.0,
+                  0.0,
+                  violations,
+                  0.0,
+                  0.0,
+                  0.0,
+                  std::string("none"),
+                  -1.0});
+    return table;
+  };
+  EXPECT_EQ(stress_answer(table_of(0.0, 0.0)), "None of 2 million random steps broke a law");
+  EXPECT_EQ(stress_answer(table_of(1200.0, 2800.0)),
+            "1,200 of 2 million random steps broke a law; 0.14 % stayed unresolved");
+}
+
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   const Stress study;
   const Options options{.seed = 5};
