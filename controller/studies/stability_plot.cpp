@@ -182,12 +182,12 @@ std::size_t thinning(std::size_t points) { return points / 2500 + 1; }
 
 Chart agreement_chart(const Table& table) {
   const Agreement all = agreement_of(table);
-  constexpr double least_x = 1e-4, least_y = 2e-7;
+  constexpr double least_x = 1e-4, most_x = 9.0, least_y = 2e-7;  // beyond: drawn there
   const auto thin = thinning(all.good.size());
   const auto dots = [&](const std::vector<Compared>& list, const std::string& name, int style, std::size_t each) {
     Curve curve{.name = name, .style = style, .marks = true, .line = false, .mark_size = 0.4};
     for (std::size_t i = 0; i < list.size(); i += each) {
-      curve.x.push_back(std::max(list[i].sensitivity, least_x));
+      curve.x.push_back(std::clamp(list[i].sensitivity, least_x, most_x));
       curve.y.push_back(100.0 * std::max(list[i].error, least_y));
     }
     return curve;
@@ -200,7 +200,8 @@ Chart agreement_chart(const Table& table) {
       .log_y = true,
       .curves = {dots(all.good, count_text(static_cast<double>(all.good.size())) + " points compared" + drawn, 0, thin),
                  dots(all.ill,
-                      count_text(static_cast<double>(all.ill.size())) + " too sensitive to compare (right of the line)",
+                      count_text(static_cast<double>(all.ill.size())) +
+                          " too sensitive to compare (right of the line; beyond 10 at its end)",
                       2, 1)},
       .x_low = 7e-5,
       .x_high = 10.0,
@@ -209,7 +210,6 @@ Chart agreement_chart(const Table& table) {
       .y_ticks = {1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0},
       .levels = {{100.0 * tolerance, "tolerance " + number_text(100.0 * tolerance, 2) + " %"}},
       .uprights = {{well_conditioned, ""}}};
-  for (const Compared& one : all.ill) panel.x_high = std::max(panel.x_high, 1.2 * one.sensitivity);
   if (all.worst.error >= least_y) {
     panel.notes.push_back({std::max(all.worst.sensitivity, least_x), 100.0 * all.worst.error,
                            "most: " + number_text(100.0 * all.worst.error, 2) + " %"});

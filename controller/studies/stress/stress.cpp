@@ -238,8 +238,8 @@ std::vector<std::string> Stress::plot(const Table& table, const Options& /*optio
                                       const std::filesystem::path& out) const {
   const Chart chart{.title = stress_answer(table),
                     .subtitle =
-                        "Laws: finite; inside of nothing; no pull, within the friction cone, against the slip; "
-                        "the same with another stiffness; no energy out of contacts",
+                        "Laws: finite numbers; nowhere inside an object; no pull, within the friction cone, against "
+                        "the slip; the same with another stiffness; no energy gained at contacts",
                     .panel_height = 380,
                     .panels = {stress_panel(table)},
                     .key = true};
