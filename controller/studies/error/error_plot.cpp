@@ -25,23 +25,30 @@ constexpr std::array<const char*, method_count> method_titles{
 
 enum Look { look_order_1, look_order_2, look_rival, look_fixed = 7, look_1_ms = 6, look_luck = 4 };
 
+// Over what errors are drawn: the time of a run, where an error is what nine of ten runs stay below, as run times are
+// compared; or the timestep, where it is the median.
+enum class Over { run_time, timestep };
+
+double x_of(Over over, const Runs& runs, std::size_t i) {
+  return over == Over::run_time ? 1e-3 * runs.cost_ns[i] : 1e3 * runs.T[i];
+}
+
+double error_of(Over over, const Runs& runs, std::size_t i) {
+  return over == Over::run_time ? runs.error[i].high : runs.error[i].median;
+}
+
 // How many of the coarsest runs err less than a finer one does, by ten times and more: their ends come where all
 // methods are exact, which says nothing about the motion.
-std::size_t lucky_runs(const Runs& ours) {
+std::size_t lucky_runs(const Runs& ours, Over over) {
   std::size_t lucky = 0;
   double worst_finer = 0.0;
   for (std::size_t i = ours.T.size(); i-- > 0;) {
-    const double error = ours.error[i].median;
+    const double error = error_of(over, ours, i);
     if (error < rounding_m && worst_finer > 10.0 * rounding_m) lucky = std::max(lucky, i + 1);
     worst_finer = std::max(worst_finer, error);
   }
   return lucky;
 }
-
-// What x is: the time of a run, or of a step.
-using Along = double (*)(const Runs&, std::size_t);
-double run_time_us(const Runs& runs, std::size_t i) { return 1e-3 * runs.cost_ns[i]; }
-double timestep_ms(const Runs& runs, std::size_t i) { return 1e3 * runs.T[i]; }
 
 void add_point(Curve& curve, double x, double error_m) {
   if (!(error_m < top_m)) return;
@@ -49,53 +56,65 @@ void add_point(Curve& curve, double x, double error_m) {
   curve.y.push_back(drawn_error(error_m));
 }
 
-void add_ours(const Runs& ours, Method method, Along along, Panel& panel) {
+void add_ours(const Runs& ours, Method method, Over over, Panel& panel) {
   Curve curve{.name = method_titles[method], .style = method == order_1 ? look_order_1 : look_order_2, .marks = true};
   if (method == order_2) curve.mark_size = 1.3;  // others may lie upon it
   Curve luck{.name = "exact by luck: finer steps err more", .style = look_luck, .marks = true, .line = false};
-  const std::size_t lucky = lucky_runs(ours);
+  const std::size_t lucky = lucky_runs(ours, over);
   for (std::size_t i = 0; i < ours.T.size(); ++i) {
-    add_point(i < lucky ? luck : curve, along(ours, i), ours.error[i].median);
+    add_point(i < lucky ? luck : curve, x_of(over, ours, i), error_of(over, ours, i));
   }
   panel.curves.push_back(curve);
   panel.curves.push_back(luck);
 }
 
-// The least error of all the others and their tunings. Over run time: by twentieths of a decade, of what is as fast.
-void add_rivals(const std::vector<Runs>& list, Along along, bool by_time, Panel& panel) {
+Curve rival_curve() { return {.name = "best of the others, tuned to the motion", .style = look_rival}; }
+
+// For each error the least run time in which any of the others reaches it, with all finer steps, too.
+Curve rivals_over_run_time(const std::vector<Runs>& list) {
+  Curve curve = rival_curve();
+  for (double error = 0.5 * top_m; error > 0.5 * rounding_m; error *= std::pow(10.0, -0.1)) {
+    double least_ns = std::numeric_limits<double>::infinity();
+    for (const Runs& runs : list) {
+      if (is_penalty(runs)) least_ns = std::min(least_ns, runs.cost(error));
+    }
+    if (std::isfinite(least_ns)) add_point(curve, 1e-3 * least_ns, error);
+  }
+  return curve;
+}
+
+// The least error of all the others at each timestep.
+Curve rivals_over_timestep(const std::vector<Runs>& list) {
   std::map<double, double> least;
   for (const Runs& runs : list) {
     if (!is_penalty(runs)) continue;
     for (std::size_t i = 0; i < runs.T.size(); ++i) {
-      const double x = along(runs, i), key = by_time ? std::round(20.0 * std::log10(x)) / 20.0 : std::log10(x);
-      const auto [place, is_new] = least.emplace(key, runs.error[i].median);
+      const auto [place, is_new] = least.emplace(runs.T[i], runs.error[i].median);
       if (!is_new) place->second = std::min(place->second, runs.error[i].median);
     }
   }
-  Curve curve{.name = "best of the others, tuned to the motion", .style = look_rival};
-  double so_far = std::numeric_limits<double>::infinity();
-  for (const auto& [key, error] : least) {
-    so_far = by_time ? std::min(so_far, error) : error;
-    add_point(curve, std::pow(10.0, key), so_far);
-  }
-  panel.curves.push_back(curve);
+  Curve curve = rival_curve();
+  for (const auto& [T, error] : least) add_point(curve, 1e3 * T, error);
+  return curve;
 }
 
-void add_fixed(const Runs& one, const Fixed& fixed, Along along, Panel& panel) {
+Curve fixed_curve(const Runs& one, const Fixed& fixed) {
   Curve curve{
       .name = "the best of them with one setting for all: " + count_text(fixed.tuning.stiffness_N_per_m) + " N/m",
       .style = look_fixed,
       .marks = true};
-  for (std::size_t i = 0; i < one.T.size(); ++i) add_point(curve, along(one, i), one.error[i].median);
-  panel.curves.push_back(curve);
+  for (std::size_t i = 0; i < one.T.size(); ++i) {
+    add_point(curve, x_of(Over::run_time, one, i), error_of(Over::run_time, one, i));
+  }
+  return curve;
 }
 
-void mark_1_ms(const std::vector<Runs>& list, Along along, Panel& panel) {
+void mark_1_ms(const std::vector<Runs>& list, Over over, Panel& panel) {
   Curve curve{.name = "steps of 1 ms", .style = look_1_ms, .marks = true, .line = false, .mark_size = 1.2};
   for (const Method method : {order_1, order_2}) {
     const Runs& ours = runs_of(list, method_names[method]);
     const std::size_t i = ours.at_1_ms();
-    add_point(curve, along(ours, i), ours.error[i].median);
+    add_point(curve, x_of(over, ours, i), error_of(over, ours, i));
   }
   panel.curves.push_back(curve);
 }
@@ -113,8 +132,7 @@ Verdict verdict_of(const std::vector<Runs>& list) {
   return {number_text(1.0 / times, 2) + " × as long", false};
 }
 
-Panel panel_of(const ErrorCase& which, const std::vector<Runs>& list, const Fixed& fixed, bool by_time) {
-  const Along along = by_time ? run_time_us : timestep_ms;
+Panel panel_of(const ErrorCase& which, const std::vector<Runs>& list, const Fixed& fixed, Over over) {
   Panel panel{.title = which.title,
               .y_label = "rms error (m)",
               .log_x = true,
@@ -123,22 +141,24 @@ Panel panel_of(const ErrorCase& which, const std::vector<Runs>& list, const Fixe
               .y_high = top_m,
               .y_ticks = {1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 1.0},
               .y_spans = {{bottom_m, rounding_m, "rounding"}}};
-  if (by_time) {
+  for (const Method method : {order_2, order_1}) {
+    add_ours(runs_of(list, method_names[method]), method, over, panel);
+  }
+  if (over == Over::run_time) {
     const Verdict verdict = verdict_of(list);
     panel.title += ": " + verdict.text;
     panel.title_colour = verdict.good ? "good" : "bad";
     panel.y_spans.push_back({1e-6, 1e-3, ""});
+    panel.curves.push_back(rivals_over_run_time(list));
+    if (const Runs* one = fixed_runs(list, fixed); one != nullptr) panel.curves.push_back(fixed_curve(*one, fixed));
+  } else {
+    panel.curves.push_back(rivals_over_timestep(list));
   }
-  for (const Method method : {order_2, order_1}) {
-    add_ours(runs_of(list, method_names[method]), method, along, panel);
-  }
-  add_rivals(list, along, by_time, panel);
-  if (const Runs* one = fixed_runs(list, fixed); one != nullptr && by_time) add_fixed(*one, fixed, along, panel);
-  mark_1_ms(list, along, panel);
+  mark_1_ms(list, over, panel);
   return panel;
 }
 
-// One range of x for all panels, in whole decades; labels at the outer ones alone.
+// One range of x for all panels, in whole decades with some room at the right; labels at the outer ones alone.
 void share_x(Chart& chart, const std::string& x_label) {
   double low = std::numeric_limits<double>::infinity(), high = 0.0;
   for (const Panel& panel : chart.panels) {
@@ -153,21 +173,21 @@ void share_x(Chart& chart, const std::string& x_label) {
   for (std::size_t i = 0; i < chart.panels.size(); ++i) {
     Panel& panel = chart.panels[i];
     panel.x_low = std::pow(10.0, std::floor(std::log10(low)));
-    panel.x_high = std::pow(10.0, std::ceil(std::log10(high)));
+    panel.x_high = std::pow(10.0, std::ceil(std::log10(8.0 * high)));
     for (double x = panel.x_low; x < 1.1 * panel.x_high; x *= 100.0) panel.x_ticks.push_back(x);
     if (i + columns >= chart.panels.size()) panel.x_label = x_label;
     if (i % columns != 0) panel.y_label.clear();
   }
 }
 
-Chart case_panels(const RunsByCase& all, bool by_time) {
+Chart case_panels(const RunsByCase& all, Over over) {
   const Fixed fixed = best_fixed(all);
   Chart chart{.columns = 2, .panel_height = 190, .key = true};
   for (const ErrorCase& which : error_cases()) {
     const auto found = all.find(which.name);
-    if (found != all.end()) chart.panels.push_back(panel_of(which, found->second, fixed, by_time));
+    if (found != all.end()) chart.panels.push_back(panel_of(which, found->second, fixed, over));
   }
-  share_x(chart, by_time ? "run time of the motion (µs)" : "timestep (ms)");
+  share_x(chart, over == Over::run_time ? "run time of the motion (µs)" : "timestep (ms)");
   return chart;
 }
 
@@ -322,11 +342,12 @@ std::string glance_answer(const RunsByCase& all) {
 
 std::vector<std::string> draw_errors(const Table& table, const std::filesystem::path& out) {
   const RunsByCase all = collect(table);
-  Chart work = case_panels(all, true), order = case_panels(all, false), glance = at_a_glance(all);
+  Chart work = case_panels(all, Over::run_time), order = case_panels(all, Over::timestep), glance = at_a_glance(all);
   work.title = work_answer(all);
   work.subtitle =
-      "Others: penalty walls by three integrators and the ROS admittance rule. Compared where both reach errors of "
-      "1 µm to 1 mm (shaded); in a panel's title: order 2 beside the best of them.";
+      "Others: penalty walls and the ROS admittance rule. Errors: what nine of ten runs stay below; compared from 1 µm "
+      "to "
+      "1 mm (shaded). Panels' titles: order 2 beside the best of the others.";
   order.title = order_answer(all);
   std::vector<std::string> warnings;
   for (const auto& [chart, file] :
