@@ -11,11 +11,11 @@
 // Method: Alart and Curnier's projection ("A mixed formulation for frictional contact problems prone to Newton like
 // solution methods", 1991) writes the law as f = P(f − r u) for any r > 0, with P the projection on the cone's section.
 // Semismooth Newton on y, with f as multipliers, solves a 6 × 6 system each time and converges in two to five; r is
-// large, so the multipliers settle in two. Where Newton cycles, projected Gauss-Seidel over the contacts (Jean and
-// Moreau's nonsmooth contact dynamics) leads it to the neighbourhood of a solution, and a line search keeps it there;
-// up to four contacts, all combinations of free, stick and slip are tried as a last resort. Without friction there is a
-// solution wherever gaps can be kept, and it is found (frictionless.cpp). What is returned has passed
-// the law's own test.
+// large, so the multipliers settle in two. Without friction there is a solution wherever gaps can be kept, and it is
+// found (frictionless.cpp). With friction, where Newton cycles: of up to three contacts all combinations of free, stick
+// and slip are tried; then projected Gauss-Seidel over the contacts (Jean and Moreau's nonsmooth contact dynamics)
+// leads to the neighbourhood of a solution, and a line search keeps it there; then friction is raised from nothing, and
+// the solution followed. What is returned has passed the law's own test.
 #pragma once
 
 #include <array>
@@ -99,8 +99,8 @@ class ContactProblem {
   bool newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
   bool damped_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
   bool next_to(const Iterate& reached, Rows rows, Twist& y, double size) noexcept;
-  bool held_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
-  bool newton_with_states(Rows rows, Twist& y, double size, Twist tangent) noexcept;
+  bool held_newton(Rows rows, Twist& y, double size, int most_iterations, bool quick) noexcept;
+  bool newton_with_states(Rows rows, Twist& y, double size, Twist start, bool quick) noexcept;
   void gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept;
   bool is_solved(Rows rows, const Twist& y, double size, double tolerance) const noexcept;
   static void balance(Rows rows, const Twist& y) noexcept;
@@ -111,6 +111,7 @@ class ContactProblem {
   // a + share (b − a)
   static void go_to(const Iterate& a, const Iterate& b, double share, Rows rows, Twist& y) noexcept;
   static bool without_friction(Rows rows, Twist& y) noexcept;  // false: nothing keeps all gaps
+  bool by_more_friction(Rows rows, Twist& y, double size) noexcept;
   bool enumerate(Rows rows, Twist& y, double size, int* different) noexcept;
   double make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept;
 

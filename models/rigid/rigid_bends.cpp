@@ -24,6 +24,10 @@
 namespace proxarm::models {
 namespace {
 
+// Of sine². Edges that cross at more than 13° meet at a place that goes along them by no more than four times what it
+// goes across: the iteration finds it without the gap's curvature.
+constexpr double kCrossing = 0.05;
+
 // Where a hollow surface bends round at a point of it: across P, by 1/distance. Nothing bends of a plane.
 struct Round {
   Mat3 P = Mat3::Zero();
@@ -141,18 +145,19 @@ std::optional<RigidWorld::NearSides> RigidWorld::near_sides(const Found& found, 
   const Pair& pair = pairs_[found.pair];
   const std::optional<Cylinder>&own = shared_->parts[pair.part].cylinder,
         &other = shared_->entries[pair.entry].cylinder;
-  const auto along_edge = [&] {
-    const EdgeLine edge = beside_cylinder(pair.part, pair.entry).edge(own ? pair.other : pair.own);
-    return Vec3((edge.to - edge.from).normalized());
-  };
+  const RigidObject& object = shared_->entries[pair.entry].object;
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
+  const auto along = [](const EdgeLine& edge) { return Vec3((edge.to - edge.from).normalized()); };
   NearSides sides;
-  sides.u = pose.orientation * (own ? own->axis : along_edge());
-  sides.v = other ? other->axis : along_edge();
+  sides.u = pose.orientation * (own ? own->axis : along(edge_of(shared_->parts[pair.part].solid, pair.own)));
+  sides.v = other             ? other->axis
+            : mesh != nullptr ? along((*mesh)->edge(pair.other).line)
+                              : along(edge_of(*std::get_if<Solid>(&object.shape), pair.other));
   if (moves(pair.entry)) sides.v = moving(pair.entry).mover.at().R * sides.v;
   sides.own_radius = own ? own->radius : shared_->parts[pair.part].solid.radius;
   sides.D = found.touch.gap + sides.own_radius;
   if (other) sides.D += other->radius;
-  if (const auto* solid = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape)) sides.D += solid->radius;
+  if (const auto* solid = std::get_if<Solid>(&object.shape)) sides.D += solid->radius;
   sides.sine2 = sides.u.cross(sides.v).squaredNorm();
   if (!(sides.sine2 > 1e-14 && sides.D > 0.0)) return {};
   const Vec3& n = found.touch.normal;
@@ -169,7 +174,7 @@ std::optional<RigidWorld::NearSides> RigidWorld::near_sides(const Found& found, 
 
 bool RigidWorld::add_bend_of_sides(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept {
   const std::optional<NearSides> sides = near_sides(found, pose);
-  if (!sides) return false;
+  if (!sides || (pairs_[found.pair].kind == Kind::round_edges && sides->sine2 > kCrossing)) return false;
   const auto& along = sides->along;
   K += force * (sides->D / sides->sine2 * along * sides->inverse * along.transpose() -
                 sides->G.transpose() * sides->P * sides->G / sides->D);
@@ -202,7 +207,7 @@ void RigidWorld::stay_along_side(Found& found, const ToolPose& pose) const noexc
 
 // Puts the coupling of the local problem, and returns ẽ.
 Twist RigidWorld::couple(const ToolPose& pose, const Twist& e) noexcept {
-  if (!shared_->bends) return e;
+  if (!shared_->bends && !shared_->edges_bend) return e;
   Mat6 K = K_;
   bool bent = false;
   lies_along_ = false;
@@ -215,6 +220,7 @@ Twist RigidWorld::couple(const ToolPose& pose, const Twist& e) noexcept {
     bent = true;
     lies_along_ = lies_along_ || is_along_side(pairs_[found.pair].kind);
   }
+  bends_ = bends_ || bent;
   problem_.set_stiffness(K);
   return bent ? problem_.yield_to(K_ * e) : e;
 }

@@ -80,7 +80,7 @@ void RigidWorld::pairs_with(const Solid& own, const Bounds& own_box, const Solid
       const EdgeLine line = edge_of(other, j);
       const double distance2 = distance2_of_segments(edge, line);
       if (distance2 > near2 || (!round && never_hold(edge, line, turn))) continue;
-      within(distance2, Kind::edges, i, j);
+      within(distance2, round ? Kind::round_edges : Kind::edges, i, j);
     }
   }
 }
@@ -152,7 +152,7 @@ void RigidWorld::edge_with(const Solid& own, const TriangleFeatures& other, std:
     const double distance2 = distance2_of_segments(edge, *line);
     if (distance2 > close.near() * close.near()) return;
     if (!(own.radius > 0.0) && never_hold(edge, *line, close.turn())) return;
-    add(Kind::edges, i, e, std::sqrt(distance2) - own.radius);
+    add(own.radius > 0.0 ? Kind::round_edges : Kind::edges, i, e, std::sqrt(distance2) - own.radius);
   });
 }
 

@@ -55,17 +55,24 @@ double RigidWorld::bend_per_m(const Pair& pair) const noexcept {
   return bend;
 }
 
-// Of the angle γ at which two rims cross; 1: the contact is of others. Where a point of one goes across the other by s,
-// the place of contact goes along by up to s/sin γ, on circles that bend: their gap bends by up to (1/r + 1/r')/sin² γ.
-// Their normal is across both, and turns by up to θ/sin γ where one turns by θ.
+// Of the angle γ at which a rim crosses a rim or an edge; 1: the contact is of others. Where a point of one goes across
+// the other by s, the place of contact goes along by up to s/sin γ, on circles that bend: their gap bends by up to (1/r
+// + 1/r')/sin² γ. Their normal is across both, and turns by up to θ/sin γ where one turns by θ.
 double RigidWorld::sine_of_rims(const Found& found, const ToolPose& pose) const noexcept {
   const Pair& pair = pairs_[found.pair];
-  if (pair.kind != Kind::rims) return 1.0;
+  if (pair.kind != Kind::rims && pair.kind != Kind::rim_edge) return 1.0;
   const Vec3& n = found.touch.normal;
-  const Vec3 own = pose.orientation * shared_->parts[pair.part].cylinder->axis;
-  Vec3 other = shared_->entries[pair.entry].cylinder->axis;
-  if (moves(pair.entry)) other = moving(pair.entry).mover.at().R * other;
-  const Vec3 along_own = own.cross(n), along_other = other.cross(n);
+  const std::optional<Cylinder>&own = shared_->parts[pair.part].cylinder,
+        &other = shared_->entries[pair.entry].cylinder;
+  const auto along_edge = [&] {
+    const EdgeLine edge = beside_cylinder(pair.part, pair.entry).edge(own ? pair.other : pair.own);
+    return Vec3(edge.to - edge.from);
+  };
+  const auto in_W = [&](const Vec3& of_object) {
+    return moves(pair.entry) ? Vec3(moving(pair.entry).mover.at().R * of_object) : of_object;
+  };
+  const Vec3 along_own = own ? Vec3((pose.orientation * own->axis).cross(n)) : Vec3(pose.orientation * along_edge());
+  const Vec3 along_other = other ? Vec3(in_W(other->axis).cross(n)) : in_W(along_edge());
   const double lengths = along_own.norm() * along_other.norm();
   return lengths > kAlong ? std::max(along_own.cross(along_other).norm() / lengths, kAlong) : kAlong;
 }

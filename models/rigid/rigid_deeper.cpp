@@ -10,6 +10,9 @@ namespace {
 
 // A sine. Steps that are long beside a tool turn it by tenths of a radian on their way to where it ends.
 constexpr double kLeans = 0.2;
+// What a body may reach beyond the plane of a contact: normals of edges that cross at 1e-7 rad are rounded by 1e-9 rad,
+// and bodies are up to a metre long. A lawful contact's plane leaves less, a false one's millimetres.
+constexpr double kBeyond_m = 1e-6;
 
 // Whether a part of an edge is behind both of the faces beside another one, as far as these go on.
 bool enters(const EdgeLine& edge, const EdgeLine& wedge) noexcept {
@@ -106,6 +109,37 @@ bool RigidWorld::leans_into(const Found& corner, const View& at) const noexcept 
     if (n.dot(d) < -kLeans * d.norm()) return true;
   }
   return false;
+}
+
+// Whether one of the two convex bodies that touch here reaches beyond the plane between them: then the normal is
+// outside of the cone of normals that this body has there. A corner on a face's border, or on the rim of a cylinder's
+// side, has its foot on that face, and none of its edges need be in the other body.
+bool RigidWorld::reaches_beyond(const Found& found, const View& at) const noexcept {
+  const Pair& pair = pairs_[found.pair];
+  if (pair.kind == Kind::point_field || pair.kind == Kind::rim_field) return false;
+  const Part& part = shared_->parts[pair.part];
+  const Vec3 &n = found.touch.normal, &x = found.touch.point;
+  if (!part.mesh) {
+    const Vec3 down = -(at.R.transpose() * n);
+    if (extent_along(part.solid, down) > down.dot(at.to_T(x)) + kBeyond_m) return true;
+  }
+  const auto* solid = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape);
+  if (solid == nullptr) return false;
+  const Placement* on = moves(pair.entry) ? &moving(pair.entry).mover.at() : nullptr;
+  const Vec3 foot = x - found.touch.gap * n, up = on == nullptr ? n : Vec3(on->R.transpose() * n);
+  return extent_along(*solid, up) > up.dot(on == nullptr ? foot : on->back(foot)) + kBeyond_m;
+}
+
+// Of what presses. Whether there was any.
+bool RigidWorld::bar_what_reaches_beyond(const ToolPose& pose) noexcept {
+  const View at = view(pose);
+  bool some = false;
+  for (std::size_t k = 0; k < linear_count_; ++k) {
+    const Found& found = found_[of_linear_[k]];
+    if (linear_[k].state == ContactState::open || !reaches_beyond(found, at)) continue;
+    pairs_[found.pair].barred = some = true;
+  }
+  return some;
 }
 
 // Whether one face of a closed mesh is all before another one's plane, as beside a valley: so is the foot on it then,

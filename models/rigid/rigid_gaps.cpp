@@ -97,10 +97,11 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) noexcept 
       const Vec3 foot = y - (t->gap + other_radius) * face.normal;
       return emit(Touch{at * foot, -(at.R * face.normal), t->gap}, lift);
     }
+    case Kind::round_edges:
+      return emit(touch_edges_round(own_edge(), other_edge(), radii, own.radius), lift);
     case Kind::edges: {
       EdgeLine other = other_edge();
       const EdgeLine edge = own_edge();
-      if (radii > 0.0) return emit(touch_edges_round(edge, other, radii, own.radius), lift);
       if (side == 0.0) return;
       if (mesh != nullptr && !other.open && !(*mesh)->edge(pair.other).ridge) {
         other.left = -other.left;
@@ -229,7 +230,7 @@ void RigidWorld::look_at_pairs(const ToolPose& pose, double within_m) noexcept {
                                                         std::max(beside_, over_m_) + kFront_m;
   for (std::size_t i = first_pair(); i < pair_count_; ++i) {
     const Moving* on = i < still_count_ ? nullptr : &moving(pairs_[i].entry);
-    if (on != nullptr && !on->close) continue;
+    if (pairs_[i].barred || (on != nullptr && !on->close)) continue;
     if (on == nullptr && pairs_[i].apart_m > near_m && !pairs_[i].pressed) {
       within_m_ = within_m;
       continue;

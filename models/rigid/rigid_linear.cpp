@@ -255,7 +255,7 @@ Vec3 RigidWorld::in_cone(Vec3 f, double mu) noexcept {
 // would use up half of what a gap may be short of is left to lack. Where gaps bend, the coupling isn't K, and the law
 // is met more closely.
 void RigidWorld::balance(const Twist& e, Twist& delta) noexcept {
-  if (shared_->bends) return;
+  if (bends_) return;
   const Twist wrench = K_ * (e + delta);
   Twist lack = -wrench;
   for (std::size_t k = 0; k < linear_count_; ++k) {

@@ -46,15 +46,11 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
   }
   for (std::size_t i = 0; i < pair_count_; ++i) {
     Pair& pair = pairs_[i];
+    pair.barred = false;
     if (pair.kind != Kind::point_face && pair.kind != Kind::face_point && pair.kind != Kind::edges) continue;
     const View& at = i < still_count_ ? at_W : moving(pair.entry).from;
     const RigidObject& object = shared_->entries[pair.entry].object;
     const bool is_mesh = std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(object.shape);
-    const double own_radius = shared_->parts[pair.part].solid.radius;
-    if (pair.kind == Kind::edges) {
-      const double radii = own_radius + (is_mesh ? 0.0 : std::get_if<Solid>(&object.shape)->radius);
-      if (radii > 0.0) continue;
-    }
     const double height = signed_start(pair, at);
     // (What pressed in a part that led nowhere may have lost its side there.)
     const bool near = pair.pressed && pair.side != 0.0F && std::abs(height) < kFront_m;

@@ -41,8 +41,9 @@ constexpr double kTurned = 1e-11;
 // next, or steps that don't get smaller than rounding of its forces makes them. After a step below this the first one
 // is taken: normals are right to 1e-8 then.
 constexpr double kRest_m = 1e-13;
-// From the fourth pose on only a share of a step is taken, halved as long as steps don't become smaller: from far it
-// may swing to and fro.
+// From such a pose on only a share of a step is taken where steps swing to and fro: where gaps bend, and later where
+// two features don't hold together, of which either one leads to where only the other is found.
+constexpr int kWhole = 3, kWholeFlat = 10;
 constexpr double kLeastShare = 0.125;
 // But not of steps that rounding makes, where contacts hold each other: 1e-17 m of their gaps are 1e7 times that in the
 // local problem's forces, and friction turns some of it into a way (contact_problem.cpp, kStiff).
@@ -57,11 +58,19 @@ constexpr int kLooks = 60000;
 
 }  // namespace
 
-// The share of a step that is taken, from that of the step before and the sizes of both.
-double RigidWorld::damped(double share, double size, double last) noexcept {
-  if (size <= kNoise_m) return 1.0;
-  const bool shrinks = size < (1.0 - 0.4 * share) * last;
-  return shrinks ? std::min(2.0 * share, 1.0) : std::max(0.5 * share, kLeastShare);
+// The share of a step that is taken, from that of the step before and both steps: what is left of a step along itself
+// says how far the whole of it would have gone too far (Aitken's rule). The place of a contact that sticks may go far
+// along two rods with next to no turn, and its friction's torque with it, of which the local problem knows nothing:
+// whole steps then grow.
+double RigidWorld::damped(double share, const Twist& delta, const Twist& last) const noexcept {
+  const double lever2 = shared_->reach * shared_->reach;
+  const auto product = [&](const Twist& a, const Twist& b) {
+    return a.head<3>().dot(b.head<3>()) + lever2 * a.tail<3>().dot(b.tail<3>());
+  };
+  const double left = product(delta, last) / product(last, last);
+  const bool grows = 1.0 - left > 2.0 * share;
+  if (size_m(delta) <= kNoise_m && !grows) return 1.0;
+  return left < 1.0 ? std::clamp(share / (1.0 - left), kLeastShare, 1.0) : kLeastShare;
 }
 
 // Of gaps.
@@ -73,18 +82,20 @@ double RigidWorld::rounding_m(const ToolPose& pose) const noexcept {
 bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept {
   const double rounding = rounding_m(q);
   double last = std::numeric_limits<double>::infinity(), share = 1.0, rest = kRest_m;
+  Twist last_delta = Twist::Zero();
   ToolPose resting;
   collected_ = false;
+  bends_ = shared_->bends;
   for (int k = 0; k < 50; ++k) {
     if (--budget_ < 0 || looks_ < 0 || problem_.exhausted()) break;
-    beside_ = k < kToAndFro ? beside_m : std::clamp(last, beside_m, kBesideAtMost_m);
     over_m_ = std::isfinite(last) ? std::clamp(last, beside_m, kBesideAtMost_m) : beside_m;
+    beside_ = k < kToAndFro ? beside_m : over_m_;
     const Twist e = difference(q, p_hat);
     find(q, may_leave_out() ? kWithin * size_m(e) : kEverywhere_m);
     Twist delta;
-    const bool roughly = shared_->bends && k > 0 && last > kNear_m;
+    const bool roughly = bends_ && k > 0 && last > kNear_m;
     const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
-    const double still_m = shared_->bends && !roughly && last < kNear_m ? rounding : 0.0;
+    const double still_m = bends_ && !roughly && last < kNear_m ? rounding : 0.0;
     // (What moves may have gone on from under the tool since the part before.)
     const bool pressed = (k > 0 || something_comes()) && pressed_count_ > 0;
     const bool solved = solve_linear(q, e, q_old, rough, still_m, delta);
@@ -103,19 +114,28 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
       continue;
     }
     if (solved) balance(e, delta);
-    if (shared_->bends && k >= 3) share = damped(share, size, last);
+    if (k >= (bends_ ? kWhole : kWholeFlat) && std::isfinite(last)) share = damped(share, delta, last_delta);
+    if (size <= kStill_m) share = 1.0;
+    last_delta = delta;
     q = moved(q, share * delta);
     // What is left after this is the last ratio times this. Where gaps bend, this step counts as well: the forces are
     // those of normals before it.
     const bool on = on_features();
-    const bool whole = share == 1.0 && !roughly && on && (!shared_->bends || size <= kStill_m);
+    const bool whole = share == 1.0 && !roughly && on && (!bends_ || size <= kStill_m);
     const bool small = std::isfinite(last) && size < 0.1 * last && size / last * size <= 0.1 * rounding &&
                        stays_balanced(delta, e) && normals_turn_by(delta) <= kTurned;
-    if (whole && ((held_ && size <= kStill_m) || size <= rounding || small)) {
+    const bool ends = whole && ((held_ && size <= kStill_m) || size <= rounding || small);
+    const bool rests = solved && !roughly && on && size < rest;
+    if ((ends || rests) && bar_what_reaches_beyond(q)) {
+      last = std::numeric_limits<double>::infinity();
+      let_loose_ = true;  // what it was barred from may have been all that held it
+      continue;
+    }
+    if (ends) {
       collected_ = false;
       return solved;
     }
-    if (solved && !roughly && on && size < rest) {
+    if (rests) {
       rest = size;
       resting = q;
       collect_contacts(q);

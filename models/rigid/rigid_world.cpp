@@ -45,6 +45,19 @@ std::optional<Cylinder> cylinder_in(const Solid& solid) {
   return cylinder_of(solid);
 }
 
+bool has_edges(const RigidObject& object) {
+  const Solid* solid = std::get_if<Solid>(&object.shape);
+  return solid != nullptr ? !solid->edges.empty()
+                          : std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(object.shape);
+}
+
+// Whether they have edges that may meet, of which one is round.
+bool meet_along_edges(const Solid& part, const RigidObject& object) {
+  if (part.edges.empty() || !has_edges(object)) return false;
+  const Solid* solid = std::get_if<Solid>(&object.shape);
+  return part.radius > 0.0 || (solid != nullptr && solid->radius > 0.0);
+}
+
 // What no contact is known for.
 void require_contact(bool cylinder, const RigidObject& object) {
   if (!cylinder) return;
@@ -119,7 +132,10 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     if (!(object.friction >= 0.0 && std::isfinite(object.friction))) {
       throw std::invalid_argument("a friction must be finite and not negative");
     }
-    for (const Part& part : shared->parts) require_contact(part.cylinder.has_value(), object);
+    for (const Part& part : shared->parts) {
+      require_contact(part.cylinder.has_value(), object);
+      shared->edges_bend = shared->edges_bend || meet_along_edges(part.solid, object);
+    }
     std::optional<Cylinder> cylinder;
     if (const Solid* solid = std::get_if<Solid>(&object.shape)) {
       shared->thinness = std::min(shared->thinness, thickness(*solid));

@@ -77,7 +77,8 @@ class RigidWorld final : public PoseAlgorithm {
     rim_field,
     point_face,
     face_point,
-    edges,
+    edges,        // both sharp
+    round_edges,  // one of them has a radius
     point_point,
     point_edge,
     edge_point,
@@ -102,7 +103,8 @@ class RigidWorld final : public PoseAlgorithm {
     std::uint32_t own = 0, other = 0;
     float side = 0.0F;  // of a two-sided surface: 1 or −1, or 0 where the pair is not to be judged in this step
     bool pressed = false;
-    float apart_m = 0.0F;                   // at least, when it was gathered; of a cylinder's 0
+    bool barred = false;   // its normal is none that the two have there: not to be judged in this part of the step
+    float apart_m = 0.0F;  // at least, when it was gathered; of a cylinder's 0
     Vec3 force_W = Vec3::Zero();            // of the last solution
     std::array<double, 2> level{1.0, 0.0};  // where a rim that lies flat was lowest, in its u and v
   };
@@ -158,7 +160,8 @@ class RigidWorld final : public PoseAlgorithm {
     double thinness = 0.0;         // the least thickness of the tool's parts
     bool hollow = false;           // a sphere or a tube
     bool bends = false;            // something is hollow, or the tool has rims: gaps' curvature counts
-    bool dense = false;            // there is a mesh, or there are many solids
+    bool edges_bend = false;  // edges may meet of which one is round: it counts where they nearly lie along each other
+    bool dense = false;       // there is a mesh, or there are many solids
   };
   static constexpr double kEverywhere_m = std::numeric_limits<double>::infinity();
   // So many contacts may be looked at in a step's local problems, some 0.2 µs each. Without it local problems that have
@@ -291,11 +294,16 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] bool passes_by(const Found& deep, const View& at) const noexcept;
   [[nodiscard]] bool rises_from(const Pair& one, const Pair& other) const noexcept;
   [[nodiscard]] bool leans_into(const Found& corner, const View& at) const noexcept;
+  [[nodiscard]] bool reaches_beyond(const Found& found, const View& at) const noexcept;
+  bool bar_what_reaches_beyond(const ToolPose& pose) noexcept;
   [[nodiscard]] double friction(const Pair& pair) const noexcept;
   void linearise(const Found& found, const ToolPose& pose, const ToolPose& q_old, LinearContact& out,
                  Mat3& frame) const noexcept;
   [[nodiscard]] const Pressed* last_pressed(std::uint16_t pair, std::uint8_t which) const noexcept;
-  [[nodiscard]] static bool is_along_side(Kind kind) noexcept { return kind == Kind::sides || kind == Kind::side_edge; }
+  // Round, and straight for a way: the place of contact goes far along it with next to no turn.
+  [[nodiscard]] static bool is_along_side(Kind kind) noexcept {
+    return kind == Kind::sides || kind == Kind::side_edge || kind == Kind::round_edges;
+  }
   bool add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
   bool add_bend_of_rim(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
   bool add_bend_of_sides(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
@@ -320,7 +328,7 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] double normals_turn_by(const Twist& delta) const noexcept;
   [[nodiscard]] static Vec3 in_cone(Vec3 f, double mu) noexcept;  // of a contact's force, normal and across
   void balance(const Twist& e, Twist& delta) noexcept;
-  [[nodiscard]] static double damped(double share, double size, double last) noexcept;
+  [[nodiscard]] double damped(double share, const Twist& delta, const Twist& last) const noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   void share_out(bool last) noexcept;
   bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
@@ -410,6 +418,7 @@ class RigidWorld final : public PoseAlgorithm {
   double extent_m_ = 0.0;          // of the coordinates of what moves
   bool without_friction_ = false;  // in the present attempt
   double behind_m_ = kFront_m;     // so far behind a feature of a cylinder may be what it holds in a part of the step
+  bool bends_ = false;             // gaps' curvature counts in the present attempt
   bool lies_along_ = false;        // a side along another, pressing in the last solution
   bool let_loose_ = false;         // a pose of the iteration left all that pressed before it, in some part of the step
   bool held_ = false;              // the last local problem by the forces of the one before

@@ -10,11 +10,6 @@ namespace {
 // Where a round body lies on an end, or along the side, it rocks between two places of a rim: so far over, in radians,
 // both are held. Either keeps to its law anywhere: no place of a rim may come into the body.
 constexpr double kNearlyLevel = 0.05;
-// A quarter of what a gap may be short of: where something straight lies along the side to within this, the place at
-// which it comes nearest is anywhere, and what holds are the ends of where both are.
-constexpr double kSag_m = 2.5e-13;
-// Up to so many times that the side gives way to the ends by less and less, or a tool would go to and fro between both.
-constexpr double kSagFades = 10.0;
 
 Vec3 on(const Solid::Rim& rim, const Vec2& z) noexcept { return z.x() * rim.u + z.y() * rim.v; }
 
@@ -134,19 +129,6 @@ std::optional<Meeting> meet_side(const Cylinder& cylinder, const Vec3& p, double
                  distance - cylinder.radius - radius};
 }
 
-namespace {
-
-// How much nearer a side is to a line that is nearly parallel to it than to the line's ends, or its own.
-double sag_of_line(const Cylinder& cylinder, const EdgeLine& edge, double radius, double sine2) noexcept {
-  constexpr double nearly_parallel = 1e-4;  // of sine²
-  if (sine2 > nearly_parallel) return std::numeric_limits<double>::infinity();
-  const double from = cylinder.axis.dot(edge.from - cylinder.from), to = cylinder.axis.dot(edge.to - cylinder.from);
-  const double both = std::min(std::max(from, to), cylinder.length) - std::max(std::min(from, to), 0.0);
-  return both > 0.0 ? sine2 * both * both / (8.0 * (cylinder.radius + radius)) : 0.0;
-}
-
-}  // namespace
-
 std::optional<Meeting> meet_side(const Cylinder& cylinder, const EdgeLine& edge, double radius,
                                  double beside) noexcept {
   const Vec3 d = edge.to - edge.from, n = cylinder.axis.cross(d), w = edge.from - cylinder.from;
@@ -155,11 +137,12 @@ std::optional<Meeting> meet_side(const Cylinder& cylinder, const EdgeLine& edge,
   const double along = w.cross(d).dot(n) / nn, s = w.cross(cylinder.axis).dot(n) / nn;
   if (along < -beside || along > cylinder.length + beside) return {};
   if (s < -beside / length || s > 1.0 + beside / length) return {};
-  const double sag = sag_of_line(cylinder, edge, radius, nn / (length * length));
-  if (sag <= kSag_m) return {};
+  const std::optional<double> gives_way = gives_way_to_ends_m({cylinder.from, cylinder.axis, cylinder.length}, edge,
+                                                              cylinder.radius + radius, nn / (length * length));
+  if (!gives_way) return {};
   std::optional<Meeting> meeting =
       meet_side(cylinder, edge.from + s * d, radius, std::numeric_limits<double>::infinity());
-  if (meeting) meeting->gap += kSag_m * std::max(0.0, (kSagFades - sag / kSag_m) / (kSagFades - 1.0));
+  if (meeting) meeting->gap += *gives_way;
   return meeting;
 }
 

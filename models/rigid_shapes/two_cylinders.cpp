@@ -45,10 +45,13 @@ double beyond_rim(const Solid::Rim& rim, const Vec3& p) noexcept {
   return std::hypot(rim.u.dot(d), rim.v.dot(d)) - rim.radius;
 }
 
-// Of two circles the places where their distance is least around, by Newton's method from a look around the second one.
+// Of two circles the places where their distance is least around, by Newton's method from a look around the smaller
+// one: places that are apart by much on it may lie next to each other on the greater one.
 class NearRims {
  public:
-  NearRims(const Solid::Rim& a, const Solid::Rim& b) noexcept : a_(&a), b_(&b) {
+  NearRims(const Solid::Rim& one, const Solid::Rim& other) noexcept
+      : swapped_(one.radius < other.radius), a_(swapped_ ? &other : &one), b_(swapped_ ? &one : &other) {
+    const Solid::Rim &a = *a_, &b = *b_;
     std::array<double, around> d2, beyond;
     for (std::size_t i = 0; i < around; ++i) {
       const Vec2& look = looks()[i];
@@ -61,27 +64,32 @@ class NearRims {
       const std::size_t last = (i + around - 1) % around, next = (i + 1) % around;
       const double angle = step * static_cast<double>(i);
       if (d2[i] <= d2[last] && d2[i] <= d2[next]) settle(angle);
-      // Where circles in about one plane cross twice between two looks.
-      if (beyond[i] > 0.0 && beyond[i] <= beyond[last] && beyond[i] <= beyond[next]) settle_dip(angle);
+      // Where circles in about one plane cross twice between two looks, the one inside of the other but for that or
+      // outside.
+      const double side = beyond[i] > 0.0 ? 1.0 : -1.0;
+      if (side * beyond[i] <= side * beyond[last] && side * beyond[i] <= side * beyond[next]) settle_dip(angle, side);
     }
   }
 
   [[nodiscard]] std::size_t count() const noexcept { return count_; }
+  [[nodiscard]] OnRim on_one(std::size_t k) const noexcept { return swapped_ ? on_b(k) : on_a(k); }
+  [[nodiscard]] OnRim on_other(std::size_t k) const noexcept { return swapped_ ? on_a(k) : on_b(k); }
+
+ private:
   [[nodiscard]] OnRim on_a(std::size_t k) const noexcept { return on_rim(*a_, angles_[k][0]); }
   [[nodiscard]] OnRim on_b(std::size_t k) const noexcept { return on_rim(*b_, angles_[k][1]); }
 
- private:
-  void settle_dip(double angle) noexcept {
+  void settle_dip(double angle, double side) noexcept {
     double low = angle - step, high = angle + step;
-    const auto beyond = [&](double at) { return beyond_rim(*a_, on_rim(*b_, at).x); };
+    const auto beyond = [&](double at) { return side * beyond_rim(*a_, on_rim(*b_, at).x); };
     for (int k = 0; k < 40; ++k) {
       const double x = low + (high - low) / 3.0, y = high - (high - low) / 3.0;
       (beyond(x) < beyond(y) ? high : low) = beyond(x) < beyond(y) ? y : x;
     }
     const double lowest = 0.5 * (low + high);
     if (!(beyond(lowest) < 0.0)) return;
-    for (const double side : {-step, step}) {
-      double inside = lowest, outside = angle + side;
+    for (const double way : {-step, step}) {
+      double inside = lowest, outside = angle + way;
       for (int k = 0; k < 40; ++k) {
         const double middle = 0.5 * (inside + outside);
         (beyond(middle) < 0.0 ? inside : outside) = middle;
@@ -122,6 +130,7 @@ class NearRims {
     angles_[count_++] = {alpha, beta};
   }
 
+  bool swapped_;
   const Solid::Rim *a_, *b_;
   std::array<std::array<double, 2>, 4> angles_;
   std::size_t count_ = 0;
@@ -166,7 +175,7 @@ int meet_rims(const Cylinder& a, std::uint32_t rim_a, const Cylinder& b, std::ui
   const NearRims near(a.rims[rim_a], b.rims[rim_b]);
   int found = 0;
   for (std::size_t k = 0; k < near.count(); ++k) {
-    const OnRim p = near.on_a(k), q = near.on_b(k);
+    const OnRim p = near.on_one(k), q = near.on_other(k);
     Vec3 n = p.along.cross(q.along) / (a.radius * b.radius);
     const double sine = n.norm();
     if (!(sine > kAlong)) continue;
@@ -184,7 +193,7 @@ double height_of_rims(const Cylinder& a, std::uint32_t rim_a, const Cylinder& b,
   const Vec3 wanted = place.x() * a.rims[rim_a].u + place.y() * a.rims[rim_a].v;
   double closest = -std::numeric_limits<double>::infinity(), height = std::numeric_limits<double>::quiet_NaN();
   for (std::size_t k = 0; k < near.count(); ++k) {
-    const OnRim p = near.on_a(k), q = near.on_b(k);
+    const OnRim p = near.on_one(k), q = near.on_other(k);
     const Vec3 n = p.along.cross(q.along).normalized();
     if (!(p.arm.dot(wanted) > closest)) continue;
     closest = p.arm.dot(wanted);
@@ -221,7 +230,7 @@ double separation_of_cylinders(const Cylinder& a, const Cylinder& b) noexcept {
     for (const Solid::Rim& rim_b : b.rims) {
       const NearRims near(rim_a, rim_b);
       for (std::size_t k = 0; k < near.count(); ++k) {
-        const OnRim p = near.on_a(k), q = near.on_b(k);
+        const OnRim p = near.on_one(k), q = near.on_other(k);
         try_along(p.along.normalized().cross(q.along.normalized()));
         if ((q.x - p.x).norm() > 0.0) try_along((q.x - p.x).normalized());
       }

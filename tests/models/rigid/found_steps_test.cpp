@@ -259,5 +259,31 @@ TEST(FoundSteps, AToolFliesNoFartherThanItKnowsWhatIsThere) {
   }
 }
 
+// A corner of the tool's box lay on the border of a box's face, and was held along that face's normal by 76 N, though
+// 24 mm of the other box stood beyond that plane: no normal of the corner. Nothing holds the tool there.
+TEST(FoundSteps, ACornerIsHeldByNoNormalThatNeitherBodyHasThere) {
+  Body tool, first, second;
+  tool.size = {0.022639806655458523, 0.0096070446856437314, 0.0082006670397520662};
+  first.size = {0.060689274079093442, 0.10709063461423154, 0.11081254449782461};
+  first.X.linear() << -0.26172927079629882, 0.94093664244671871, 0.21479297872494241, -0.92732250472824651,
+      -0.18347802978141825, -0.32620359411272626, -0.26752712205114626, -0.28455939184751022, 0.92057329500610985;
+  first.X.translation() = Vec3(0.0060766439980029924, 0.044351612534366966, -0.029903158515251795);
+  second.size = {0.089719958945431277, 0.034979960437521149, 0.032374064814405086};
+  second.X.linear() << 0.12084548456455646, 0.053495448258878919, -0.99122883628148117, -0.87797670548818374,
+      -0.46018062957600891, -0.13187377594936539, -0.46319895669190886, 0.88621217841925981, -0.0086429937473915253;
+  second.X.translation() = Vec3(0.012473298921297893, -0.029230056576850929, -0.00093014037838026059);
+  const ToolPose p{{0.044664770272442707, -0.061131678450569348, -0.03838872281411921},
+                   {0.59947938209475826, -0.79331230006944631, 0.0078472421235510278, 0.10591735359640543}};
+  const ToolPose q{{0.044664509747851085, -0.061185066676884989, -0.038355815393321231},
+                   {0.59950089364898151, -0.79330680927796959, 0.0078483243688238814, 0.10583661309717707}};
+  RigidWorld g({{{BoxTool{tool.size}, Pose::Identity(), {}}}},
+               {object_of(first, 0.58135246952585007), object_of(second, 0.58969682247893962, 1)});
+  const ToolPose r = g.step(isotropic(4e6, 5e4), p, q);
+  EXPECT_FALSE(g.unresolved());
+  EXPECT_GE(std::min(apart(at(tool, isometry(r)), first), apart(at(tool, isometry(r)), second)), 0.0);
+  for (const PoseContact& contact : g.contacts()) EXPECT_EQ(contact.force_W, Vec3(Vec3::Zero()));
+  EXPECT_EQ(r, p);
+}
+
 }  // namespace
 }  // namespace proxarm::models
