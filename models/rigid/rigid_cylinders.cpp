@@ -204,6 +204,7 @@ bool RigidWorld::counts(const Pair& pair, const AtCylinder& here, const Meeting&
     }
     case Kind::rim_face:
       if (here.body.mesh() != nullptr) return !was_behind(pair, here, meeting.on_cylinder);
+      if (came_around(pair, here, meeting.on_cylinder)) return false;
       return here.body.highest_over_others(cylinder.rims[here.round], here.feature) <= meeting.gap;
     case Kind::rim_edge:
       return !was_behind_edge(pair, here, meeting.on_cylinder);
@@ -220,6 +221,13 @@ bool RigidWorld::was_behind(const Pair& pair, const AtCylinder& here, const Vec3
   const double height = face.normal.dot(was) - face.offset;
   if (height >= -kFront_m) return false;
   return height < -behind_m_ || face.over(was);
+}
+
+// Whether a place of a rim that was behind a solid's face at the beginning is outside of the solid, before another one
+// of its faces: it came around an edge.
+bool RigidWorld::came_around(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept {
+  const BesideCylinder::Face face = here.body.face(here.feature);
+  return face.normal.dot(here.elsewhere(place, from_of(pair))) - face.offset < -kFront_m && here.body.is_outside(place);
 }
 
 // An edge far behind the rim, as one on the body's other side.

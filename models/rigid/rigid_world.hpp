@@ -269,6 +269,7 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] int meet_face(const Pair& pair, const AtCylinder& here, std::array<Meeting, 4>& out) const noexcept;
   [[nodiscard]] bool counts(const Pair& pair, const AtCylinder& here, const Meeting& meeting) const noexcept;
   [[nodiscard]] bool was_behind(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept;
+  [[nodiscard]] bool came_around(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept;
   [[nodiscard]] bool was_behind_edge(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept;
   [[nodiscard]] View from_of(const Pair& pair) const noexcept;
   // The places where the two may touch; infinitely far where one doesn't count. Returns their number.

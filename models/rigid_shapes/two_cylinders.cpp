@@ -45,6 +45,9 @@ double beyond_rim(const Solid::Rim& rim, const Vec3& p) noexcept {
   return std::hypot(rim.u.dot(d), rim.v.dot(d)) - rim.radius;
 }
 
+// Of a look around: Newton's method does the rest.
+constexpr int kHalvings = 12;
+
 // Of two circles the places where their distance is least around, by Newton's method from a look around the smaller
 // one: places that are apart by much on it may lie next to each other on the greater one.
 class NearRims {
@@ -64,6 +67,8 @@ class NearRims {
       const std::size_t last = (i + around - 1) % around, next = (i + 1) % around;
       const double angle = step * static_cast<double>(i);
       if (d2[i] <= d2[last] && d2[i] <= d2[next]) settle(angle);
+      // Circles in about one plane come nearest where they cross, with a place that is far between two such.
+      if (beyond[i] * beyond[next] < 0.0) settle(crossing(angle, angle + step));
       // Where circles in about one plane cross twice between two looks, the one inside of the other but for that or
       // outside.
       const double side = beyond[i] > 0.0 ? 1.0 : -1.0;
@@ -88,14 +93,17 @@ class NearRims {
     }
     const double lowest = 0.5 * (low + high);
     if (!(beyond(lowest) < 0.0)) return;
-    for (const double way : {-step, step}) {
-      double inside = lowest, outside = angle + way;
-      for (int k = 0; k < 40; ++k) {
-        const double middle = 0.5 * (inside + outside);
-        (beyond(middle) < 0.0 ? inside : outside) = middle;
-      }
-      settle(outside);
+    for (const double way : {-step, step}) settle(crossing(lowest, angle + way));
+  }
+
+  // Of two places on the smaller circle, one inside of the other circle's cylinder and one outside.
+  [[nodiscard]] double crossing(double one, double other) const noexcept {
+    const bool inside = beyond_rim(*a_, on_rim(*b_, one).x) < 0.0;
+    for (int k = 0; k < kHalvings; ++k) {
+      const double middle = 0.5 * (one + other);
+      ((beyond_rim(*a_, on_rim(*b_, middle).x) < 0.0) == inside ? one : other) = middle;
     }
+    return other;
   }
 
   void settle(double beta) noexcept {

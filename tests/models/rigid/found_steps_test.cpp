@@ -285,5 +285,33 @@ TEST(FoundSteps, ACornerIsHeldByNoNormalThatNeitherBodyHasThere) {
   EXPECT_EQ(r, p);
 }
 
+// Beside a wedge the rim of a cylinder came around an edge to behind a face, 0.5 mm outside of the solid: it was taken
+// for a place that this face holds. The tool stood still from there on.
+TEST(FoundSteps, ARimThatCameAroundAnEdgeIsNotHeldByTheFaceThatItIsBehind) {
+  const Vec3 from(0.021196623963965235, 0.0028144656111196249, -0.024762770383166505),
+      to(-0.015500877614183558, -0.0015542196935612275, -0.015113984073191641);
+  Pose X = Pose::Identity();
+  X.linear() = Quaternion::FromTwoVectors(Vec3::UnitZ(), to - from).toRotationMatrix();
+  X.translation() = 0.5 * (from + to);
+  RigidObject cylinder;
+  cylinder.shape = solid_of(CylinderTool{(to - from).norm(), 0.0029512018388725037}, X);
+  ConvexTool hull;
+  hull.points_m = {{0.019480496452654702, -0.011126654510081662, -0.023938084574612401},
+                   {0.016345829035008076, -0.0011335304143145009, 0.018178696481087279},
+                   {0.010799448528826644, -0.0039735419816950279, -0.023384548214497772},
+                   {-0.0087045080754895518, 0.0094668362826997397, -0.025635679201544383},
+                   {0.0068268794251659859, 0.013812889935028147, -0.0162143043317616}};
+  const ToolPose q{{-0.039451780848773738, -0.0030790275818912863, -0.007837852425352532},
+                   {0.59258398310897553, 0.45954879567575135, -0.40371641807497782, -0.52409176785404465}};
+  const ToolPose p{{-0.03943355724718358, -0.0030851588551347106, -0.007788622668829937},
+                   {0.59258001045681319, 0.4595515565854878, -0.40373478322722789, -0.52407969132501386}};
+  RigidWorld g({{{hull, Pose::Identity(), {}}}}, {cylinder});
+  const ToolPose r = g.step(isotropic(6.24e6, 3.25e4), p, q);
+  EXPECT_FALSE(g.unresolved());
+  EXPECT_GT((r.position - q.position).norm(), 1e-6);
+  EXPECT_GE(g.clearance_m(r), -1e-12);
+  for (const PoseContact& contact : g.contacts()) EXPECT_LT(contact.force_W.norm(), 10.0);
+}
+
 }  // namespace
 }  // namespace proxarm::models

@@ -114,24 +114,54 @@ Cylinder cylinder(const Vec3& from, const Vec3& along, double length, double rad
   return cylinder_of(solid_of(CylinderTool{length, radius}, X));
 }
 
-// A small rim crosses a great one at two places next to each other: from half of all frames in which a rim's places are
-// counted one wasn't found, and the cylinder went through the other by micrometres.
+// Rims that cross at two places next to each other, of which one is looked for.
+struct Rims {
+  Vec3 from, to;  // of the object's axis
+  std::uint32_t end;
+  double radius;
+  Vec3 middle, along;  // of the tool
+  double length, tools_radius;
+  std::uint32_t tools_end;
+  double gap;
+};
+
+// From half of all frames in which a rim's places are counted one wasn't found, and the cylinder went through the other
+// by micrometres, or stood for half a second.
 TEST(Rods, WhereTwoRimsCrossIsFoundWhereverTheirPlacesAreCountedFrom) {
-  const Vec3 small_axis =
-      Vec3(0.045718320819, -0.005893386557, -0.011945963346) - Vec3(-0.008192672665, 0.067112165561, -0.002366404673);
-  const Vec3 great_axis(0.612263451598, -0.785057162953, -0.093908022736);
-  const double length = 0.014048985606, turn = 2.0 * std::numbers::pi / 60.0;
-  for (int i = 0; i < 60; ++i) {
-    const Cylinder small = cylinder({-0.008192672665, 0.067112165561, -0.002366404673}, small_axis, small_axis.norm(),
-                                    0.002748115085, i * turn);
-    for (int j = 0; j < 60; ++j) {
-      const Vec3 middle(-0.023984789960, 0.063430824225, 0.001061113979);
-      const Cylinder great = cylinder(middle - 0.5 * length * great_axis, great_axis, length, 0.012782688071, j * turn);
-      std::array<Meeting, 4> places;
-      const int count = meet_rims(small, 0, great, 1, places);
-      const bool found = std::any_of(places.begin(), places.begin() + count,
-                                     [](const Meeting& m) { return std::abs(m.gap + 1.86166e-6) < 1e-10; });
-      EXPECT_TRUE(found) << i << ", " << j;
+  const Rims small{{-0.008192672665, 0.067112165561, -0.002366404673},
+                   {0.045718320819, -0.005893386557, -0.011945963346},
+                   0,
+                   0.002748115085,
+                   {-0.023984789960, 0.063430824225, 0.001061113979},
+                   {0.612263451598, -0.785057162953, -0.093908022736},
+                   0.014048985606,
+                   0.012782688071,
+                   1,
+                   -1.86166e-6};
+  const Rims close{{-0.027411119911, 0.012986595404, 0.010989517097},
+                   {-0.023334861730, 0.018198162893, -0.007977120948},
+                   1,
+                   0.005937614786,
+                   {-0.003073434076, 0.016600429014, -0.013177129219},
+                   {0.290274157534, 0.253624749637, -0.922721734782},
+                   0.019479838471,
+                   0.012489897435,
+                   0,
+                   -2.81775e-7};
+  const double turn = 2.0 * std::numbers::pi / 60.0;
+  for (const Rims& rims : {small, close}) {
+    for (int i = 0; i < 60; ++i) {
+      const Cylinder object =
+          cylinder(rims.from, rims.to - rims.from, (rims.to - rims.from).norm(), rims.radius, i * turn);
+      for (int j = 0; j < 60; ++j) {
+        const Cylinder tool = cylinder(rims.middle - 0.5 * rims.length * rims.along, rims.along, rims.length,
+                                       rims.tools_radius, j * turn);
+        std::array<Meeting, 4> places;
+        const int count = meet_rims(object, rims.end, tool, rims.tools_end, places);
+        const bool found = std::any_of(places.begin(), places.begin() + count,
+                                       [&](const Meeting& m) { return std::abs(m.gap - rims.gap) < 1e-10; });
+        EXPECT_TRUE(found) << i << ", " << j;
+      }
     }
   }
 }
