@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
-#include <set>
 
 #include "controller/studies/common/chart.hpp"
 #include "controller/studies/common/chart_page.hpp"
@@ -66,7 +64,6 @@ std::vector<Drawn> usual_setups(const Table& table, Way way) {
   std::ranges::sort(list, {}, [](const Drawn& d) { return std::tuple(d.mass, d.looks_ahead, d.torque); });
   for (Drawn& drawn : list) {
     drawn.name = number_text(drawn.mass, 3) + (way == Way::turning ? " kg m²" : " kg");
-    if (way == Way::wall) drawn.name += " on the wall";
     if (drawn.looks_ahead) drawn.name += drawn.torque ? ", lookahead and torque" : ", lookahead";
   }
   return list;
@@ -114,8 +111,8 @@ Panel empty_panel(const std::string& title, const std::string& y_label, double l
           .x_ticks = {0.1, 1.0, 10.0}};
 }
 
-// The error in per cent, with the limits, and a ring where 10 % are passed: of each setup, or of the first of all.
-Panel error_panel(const Table& table, const std::vector<Drawn>& setups, bool turning, bool each) {
+// The error in per cent, with the limits, and a ring where 10 % are passed: of each setup, or of the first inertia.
+Panel error_panel(const Table& table, const std::vector<Drawn>& setups, bool turning) {
   Panel panel = empty_panel(std::string("Error of the ") + (turning ? "inertia" : "mass") + " felt, " +
                                 (turning ? "about the worst axis" : "in the worst direction"),
                             turning ? "|τ/α − J|/J (%)" : "|F/a − M|/M (%)", 0.05, 1000.0, true);
@@ -123,42 +120,19 @@ Panel error_panel(const Table& table, const std::vector<Drawn>& setups, bool tur
   const std::size_t error = table.column(turning ? "inertia_error" : "mass_error");
   panel.curves = curves_of(setups, 0, [&](std::size_t row) { return 100.0 * table.number(row, error); });
   for (const double limit : fidelity_limits) panel.levels.push_back({100.0 * limit, percent_text(limit)});
-  std::set<double> bands;
-  for (const Drawn& drawn : setups) bands.insert(band_Hz(drawn.error_of_Hz, asked_limit));
-  for (const double band : bands) {
-    if (band > 0.0 && band < 0.99 * setups[0].error_of_Hz.rbegin()->first) {
-      const bool last = bands.size() > 1 && band == *bands.rbegin();
-      panel.notes.push_back(
-          {band, 100.0 * asked_limit, number_text(band, 2) + " Hz", last ? Note::Side::below : Note::Side::above});
-    }
-    if (!each) break;
+  double last = 0.0;
+  for (const Drawn& drawn : setups) {
+    const double band = band_Hz(drawn.error_of_Hz, asked_limit);
+    if (!(band > last) || !(band < 0.99 * drawn.error_of_Hz.rbegin()->first)) continue;
+    const std::string how = turning              ? ""
+                            : !drawn.looks_ahead ? ": plain"
+                            : drawn.torque       ? ": and torque"
+                                                 : ": lookahead";
+    panel.notes.push_back({band, 100.0 * asked_limit, number_text(band, 2) + " Hz" + how,
+                           last > 0.5 * band ? Note::Side::below : Note::Side::left});
+    last = band;
+    if (turning) break;
   }
-  return panel;
-}
-
-// Error, and what is felt in phase and beside it.
-std::vector<Panel> free_panels(const Table& table, const std::vector<Drawn>& setups, bool turning) {
-  const std::string ratio = turning ? "τ/α" : "F/a", asked = turning ? "J" : "M";
-  const std::size_t real = table.column(turning ? "inertia_real_kg_m2" : "mass_real_kg"),
-                    imaginary = table.column(turning ? "inertia_imag_kg_m2" : "mass_imag_kg"),
-                    wanted = table.column(turning ? "inertia_kg_m2" : "mass_kg");
-  const auto value = [&](std::size_t row, std::size_t column) { return table.number(row, column); };
-  Panel size = empty_panel("In phase (below 0: pulls)", "Re(" + ratio + ")/" + asked, -2.0, 3.0, false);
-  Panel phase = empty_panel("Phase (above 0: pushes on)", "arg(" + ratio + ") (°)", -180.0, 180.0, false);
-  phase.y_ticks = {-180.0, -90.0, 0.0, 90.0, 180.0};
-  size.curves = curves_of(setups, 0, [&](std::size_t row) { return value(row, real) / value(row, wanted); });
-  phase.curves = curves_of(setups, 0, [&](std::size_t row) {
-    return 180.0 / std::numbers::pi * std::atan2(value(row, imaginary), value(row, real));
-  });
-  return {error_panel(table, setups, turning, !turning), size, phase};
-}
-
-Panel wall_panel(const Table& table) {
-  const std::size_t stiffness = table.column("stiffness_N_per_m");
-  Panel panel = empty_panel("Leaning on a wall", "|F/x| (N/m)", 1e4, 1e6, true);
-  panel.curves =
-      curves_of(usual_setups(table, Way::wall), 4, [&](std::size_t row) { return table.number(row, stiffness); });
-  if (!panel.curves.empty()) panel.curves[0].mark_size = 1.7;  // others lie upon it
   return panel;
 }
 
@@ -168,7 +142,7 @@ std::string fidelity_answer(const Table& table) {
   const std::vector<Drawn> setups = one_mass(table);
   if (setups.empty()) return "What the hand feels at the simulated arm";
   std::string answer =
-      timestep_text() + number_text(setups[0].mass, 3) + " kg feels within " + percent_text(asked_limit);
+      timestep_text() + number_text(setups[0].mass, 3) + " kg feels right within " + percent_text(asked_limit);
   for (const Drawn& drawn : setups) {
     if (&drawn != &setups[0]) answer += ",";
     if (drawn.looks_ahead) answer += drawn.torque ? " with lookahead and torque" : " with lookahead";
@@ -184,27 +158,23 @@ std::string fidelity_turning_answer(const Table& table) {
       *std::ranges::min_element(setups, {}, [](const Drawn& drawn) { return band_Hz(drawn.error_of_Hz, asked_limit); });
   std::string inertias = number_text(setups.front().mass, 3);
   if (setups.size() > 1) inertias += " to " + number_text(setups.back().mass, 3);
-  return timestep_text() + inertias + " kg m² " + (setups.size() > 1 ? "feel" : "feels") + " within " +
+  return timestep_text() + inertias + " kg m² " + (setups.size() > 1 ? "all feel" : "feels") + " right within " +
          percent_text(asked_limit) + " " + band_text(least.error_of_Hz, asked_limit) + " (worst axis)";
 }
 
 std::vector<std::string> draw_fidelity(const Table& table, const std::filesystem::path& out) {
   Chart place{.title = fidelity_answer(table),
               .subtitle = "Default cell, simulated; torque: drives that measure the torque of their gears",
-              .columns = 3,
-              .panel_height = 230,
-              .first_wide = true,
+              .panel_height = 330,
               .key = true};
   Chart turning = place;
   turning.title = fidelity_turning_answer(table);
   turning.subtitle = "Default cell, simulated; a tool that the hand turns about x, y and z";
-  turning.columns = 2;
   if (const std::vector<Drawn> setups = one_mass(table); !setups.empty()) {
-    place.panels = free_panels(table, setups, false);
+    place.panels = {error_panel(table, setups, false)};
   }
-  place.panels.push_back(wall_panel(table));
   if (const std::vector<Drawn> setups = usual_setups(table, Way::turning); !setups.empty()) {
-    turning.panels = free_panels(table, setups, true);
+    turning.panels = {error_panel(table, setups, true)};
   }
   std::vector<std::string> warnings;
   for (const auto& [chart, file] : {std::pair{&place, "fidelity.svg"}, std::pair{&turning, "fidelity_turning.svg"}}) {

@@ -62,13 +62,12 @@ struct Enough {
   double none_from_N_per_m = 0.0;  // 0: all of the stiffnesses have a stable mass
 };
 
-Enough enough_of(const Table& table) {
+Enough enough_of(const Table& table, double delay_s) {
   const Points points(table);
-  Enough found;
+  Enough found{.delay_s = delay_s};
   for (const double T : points.grid("period_s")) {
     if (std::abs(T - 1e-3) < std::abs(found.period_s - 1e-3)) found.period_s = T;
   }
-  for (const double delay : points.grid("delay_s")) found.delay_s = std::max(found.delay_s, delay);
   std::map<double, double> smallest_kg;  // by the hand's stiffness; below 0: there is none
   for (std::size_t row = 0; row < table.rows(); ++row) {
     if (!points.is_drawn(row, heavy, found.delay_s) || points.value(row, "period_s") != found.period_s) continue;
@@ -95,7 +94,7 @@ std::string milliseconds(double s) { return number_text(1e3 * s, 2) + " ms"; }
 
 std::string delay_text(double delay_s) { return delay_s > 0.0 ? "T + " + milliseconds(delay_s) : "T alone"; }
 
-// At most three delays, the shortest and the longest among them.
+// At most three delays of the heavy hand, the shortest and the longest among them.
 std::vector<double> drawn_delays(const Points& points) {
   const std::vector<double> all = points.grid("delay_s");
   if (all.size() <= 3) return all;
@@ -122,27 +121,26 @@ Map map_of(const Table& table, const Points& points, const Hold& hold, double de
 
 MapChart stability_chart(const Table& table) {
   const Points points(table);
-  const Enough enough = enough_of(table);
-  MapChart chart{.title = stability_answer(table),
-                 .subtitle = "Smallest stable mass, measured (order 1, drives of 100 Hz)",
-                 .note = "Grey: no mass up to 1000 kg is stable. Each cell is one grid point, drawn around it.",
-                 .z_label = "mass (kg)",
-                 .z_least = 1e-2,
-                 .columns = 3,
-                 .x_ticks = {0.25, 0.5, 1.0, 2.0, 4.0, 8.0},
-                 .y_ticks = {100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0}};
+  MapChart chart{
+      .title = stability_answer(table),
+      .subtitle = "Colour: the smallest mass that is stable, found by simulation (order 1, drives of 100 Hz)",
+      .note = "Grey: no mass up to 1000 kg is stable. White dots: the stiffest hands of the title.",
+      .z_label = "mass (kg)",
+      .z_least = 1e-2,
+      .columns = 3,
+      .x_ticks = {0.25, 0.5, 1.0, 2.0, 4.0, 8.0},
+      .y_ticks = {100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0}};
   if (points.grid("period_s").empty()) return chart;
   const std::vector<double> delays = drawn_delays(points);
   chart.columns = static_cast<int>(delays.size());
   for (const Hold& hold : {bare, heavy}) {
     for (const double delay : delays) chart.maps.push_back(map_of(table, points, hold, delay));
   }
-  if (enough.mass_kg > 0.0) {
-    const bool room_above = enough.none_from_N_per_m > 0.0;
-    chart.maps.back().notes.push_back(
-        {1e3 * enough.period_s, enough.up_to_N_per_m,
-         enough_text(enough.mass_kg) + " up to " + number_text(enough.up_to_N_per_m, 3) + " N/m",
-         room_above ? Note::Side::above : Note::Side::below});
+  for (std::size_t i = 0; i < delays.size(); ++i) {
+    const Enough enough = enough_of(table, delays[i]);
+    if (!(enough.mass_kg > 0.0)) continue;
+    chart.maps[delays.size() + i].notes.push_back(
+        {1e3 * enough.period_s, enough.up_to_N_per_m, "here " + enough_text(enough.mass_kg), Note::Side::below});
   }
   return chart;
 }
@@ -224,16 +222,21 @@ Chart agreement_chart(const Table& table) {
 }  // namespace
 
 std::string stability_answer(const Table& table) {
-  const Enough enough = enough_of(table);
-  if (!(enough.mass_kg > 0.0)) return "Which mass is stable";
-  const std::string loop =
-      "With a timestep of " + milliseconds(enough.period_s) + " and a delay of " + delay_text(enough.delay_s) + ", ";
-  const std::string hand = " is stable in a hand of " + number_text(heavy.mass_kg, 2) + " kg up to " +
-                           number_text(enough.up_to_N_per_m, 3) + " N/m";
-  const std::string stiffer = enough.none_from_N_per_m > 0.0
-                                  ? "; at " + number_text(enough.none_from_N_per_m, 3) + " N/m no mass is"
-                                  : ", the stiffest that was tried";
-  return loop + "a mass of " + enough_text(enough.mass_kg) + hand + stiffer;
+  const Points points(table);
+  std::string list;
+  Enough last;
+  for (const double delay : drawn_delays(points)) {
+    const Enough enough = enough_of(table, delay);
+    if (!(enough.mass_kg > 0.0)) continue;
+    const bool all = !(enough.none_from_N_per_m > 0.0);
+    list += (list.empty() ? " " : ", ") + number_text(enough.up_to_N_per_m, 3) + " N/m" +
+            (all ? " (the stiffest that was tried)" : "") + " with " + (list.empty() ? "a delay of " : "") +
+            delay_text(delay);
+    last = enough;
+  }
+  if (list.empty()) return "Which mass is stable";
+  return "The longer the delay, the softer the hand must be: at a timestep of " + milliseconds(last.period_s) +
+         " up to" + list + " (hand of " + number_text(heavy.mass_kg, 2) + " kg)";
 }
 
 std::string agreement_answer(const Table& table) {

@@ -205,6 +205,9 @@ Layout layout_of(const Chart& chart, double top, std::size_t entries, std::size_
     const std::size_t columns = wide ? 1 : static_cast<std::size_t>(chart.columns);
     const std::size_t end = std::min(i + columns, chart.panels.size());
     double above = 0.0, below = 0.0, right = 0.0;
+    if (chart.columns == 1) {  // frames below each other are of one width
+      for (const Panel& panel : chart.panels) right = std::max(right, room_right(panel));
+    }
     for (std::size_t k = i; k < end; ++k) {
       above = std::max(above, room_above(chart.panels[k]));
       below = std::max(below, room_below(chart.panels[k]));

@@ -190,7 +190,7 @@ Panel stress_panel(const Table& table) {
               .log_x = true,
               .log_y = true};
   constexpr std::array titles{"in contact", "slipping", "several lawful solutions",
-                              "unresolved: the step itself says that no contacts fit; judged no further"};
+                              "unresolved: the step says itself that no forces fit"};
   Curve bound{.fill = true};
   Curve broke{.name = "broke a law", .style = 2, .marks = true, .line = false, .mark_size = 1.4};
   std::vector<Curve> met;
@@ -213,7 +213,13 @@ Panel stress_panel(const Table& table) {
   panel.y_high = 2.0;
   if (!bound.x.empty()) {
     panel.notes.push_back({std::sqrt(bound.x.front() * bound.x.back()), 4.0 * panel.y_low,
-                           "none broke a law: fewer than this share (95 %)", Note::Side::on, false});
+                           "a law broken: 0 found; the true share is below this edge (95 % sure)", Note::Side::on,
+                           false});
+  }
+  const auto steps = static_cast<double>(sum(table, "steps")),
+             unresolved = static_cast<double>(sum(table, "unresolved"));
+  if (unresolved > 0.0) {
+    panel.levels.push_back({unresolved / steps, number_text(100.0 * unresolved / steps, 2) + " % over all"});
   }
   panel.curves.push_back(bound);
   panel.curves.insert(panel.curves.end(), met.begin(), met.end());
@@ -229,17 +235,17 @@ std::string stress_answer(const Table& table) {
   const std::string of = steps < 1e6 ? count_text(steps) : number_text(1e-6 * steps, 3) + " million";
   return (violations == 0 ? "None" : count_text(static_cast<double>(violations))) + " of " + of +
          " random steps broke a law" +
-         (unresolved == 0
-              ? ""
-              : "; " + number_text(100.0 * static_cast<double>(unresolved) / steps, 2) + " % stayed unresolved");
+         (unresolved == 0 ? ""
+                          : "; " + number_text(100.0 * static_cast<double>(unresolved) / steps, 2) +
+                                " % of them stayed unresolved and weren't judged");
 }
 
 std::vector<std::string> Stress::plot(const Table& table, const Options& /*options*/,
                                       const std::filesystem::path& out) const {
   const Chart chart{.title = stress_answer(table),
                     .subtitle =
-                        "Laws: finite numbers; nowhere inside an object; no pull, within the friction cone, against "
-                        "the slip; the same with another stiffness; no energy gained at contacts",
+                        "The laws: numbers are finite; nothing is inside an object; contacts never pull, friction is "
+                        "at most μ times the pressure and against the slip; contacts give no energy",
                     .panel_height = 380,
                     .panels = {stress_panel(table)},
                     .key = true};

@@ -62,21 +62,23 @@ TEST_F(FidelityAnswer, ComparesOneMassWithItselfInTheWorstDirection) {
   add_in_two_directions(10.0, 0.1, false, false);
   add_in_two_directions(10.0, 0.06, true, false);
   add_in_two_directions(10.0, 0.001, true, true);
-  EXPECT_EQ(fidelity_answer(table),
-            "At T = 1 ms 10 kg feels within 10 % up to 1 Hz, with lookahead up to 1.7 Hz, with lookahead and torque up "
-            "to 2 Hz, the highest measured (worst direction)");
+  EXPECT_EQ(
+      fidelity_answer(table),
+      "At T = 1 ms 10 kg feels right within 10 % up to 1 Hz, with lookahead up to 1.7 Hz, with lookahead and torque up "
+      "to 2 Hz, the highest measured (worst direction)");
 }
 
 TEST_F(FidelityAnswer, SaysWhereNothingIsWithinTheLimit) {
   add_in_two_directions(10.0, 1.0, false, false);
   EXPECT_EQ(fidelity_answer(table),
-            "At T = 1 ms 10 kg feels within 10 % at no frequency from 0.3 Hz on (worst direction)");
+            "At T = 1 ms 10 kg feels right within 10 % at no frequency from 0.3 Hz on (worst direction)");
 }
 
 TEST_F(FidelityAnswer, IsOfAllInertiasTheLeast) {
   add(4.0, 0.05, 0.05, false, false);
   add(4.0, 0.3, 0.09, false, false);
-  EXPECT_EQ(fidelity_turning_answer(table), "At T = 1 ms 0.05 to 0.3 kg m² feel within 10 % up to 1.1 Hz (worst axis)");
+  EXPECT_EQ(fidelity_turning_answer(table),
+            "At T = 1 ms 0.05 to 0.3 kg m² all feel right within 10 % up to 1.1 Hz (worst axis)");
 }
 
 TEST_F(FidelityAnswer, ClaimsNothingWithoutData) {

@@ -145,11 +145,11 @@ TEST(Stress, AToolThatGoesOverAnEdgeAndLetsGoElsewhereIsCountedAsAtAnEdge) {
 }
 
 // Of the first, step 23: on its way the tool comes over an edge a micrometre early, where both sides are solutions. Of
-// the second, step 214, poses on the way are now on this side, now on the other. Of the third, step 318, turned by
-// 0.16 rad, what came over the edge just before the end was taken for what it came from; of the last, step 55, three
-// places are met at a vertex, by a way of which a part is unresolved.
+// the second, step 214, poses on the way are now on this side, now on the other; of the last, step 55, three places are
+// met at a vertex, by a way of which a part is unresolved. (A third run, 813388677158608, came over its edge by a force
+// along a normal that neither body has there: it doesn't any more.)
 TEST(Stress, AToolMayComeOverAnEdgeWhereBothSidesAreSolutions) {
-  expect_edges({2679357126334080ULL, 7836632257535979ULL, 813388677158608ULL, 1180702795386827ULL});
+  expect_edges({2679357126334080ULL, 7836632257535979ULL, 1180702795386827ULL});
 }
 
 // Step 74: an edge of the tool comes onto a vertex, lies on it for a part of the way and goes on beyond it. The judge
@@ -305,7 +305,7 @@ TEST(Stress, ItsTitleSaysHowManyBrokeALawAndHowManyStayedUnresolved) {
   };
   EXPECT_EQ(stress_answer(table_of(0.0, 0.0)), "None of 2 million random steps broke a law");
   EXPECT_EQ(stress_answer(table_of(1200.0, 2800.0)),
-            "1,200 of 2 million random steps broke a law; 0.14 % stayed unresolved");
+            "1,200 of 2 million random steps broke a law; 0.14 % of them stayed unresolved and weren't judged");
 }
 
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
