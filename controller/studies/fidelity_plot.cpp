@@ -111,6 +111,12 @@ Panel empty_panel(const std::string& title, const std::string& y_label, double l
           .x_ticks = {0.1, 1.0, 10.0}};
 }
 
+// That which feels right within the least band.
+const Drawn& least_of(const std::vector<Drawn>& setups) {
+  return *std::ranges::min_element(setups, {},
+                                   [](const Drawn& drawn) { return band_Hz(drawn.error_of_Hz, asked_limit); });
+}
+
 // The error in per cent, with the limits, and a ring where 10 % are passed: of each setup, or of the first inertia.
 Panel error_panel(const Table& table, const std::vector<Drawn>& setups, bool turning) {
   Panel panel = empty_panel(std::string("Error of the ") + (turning ? "inertia" : "mass") + " felt, " +
@@ -123,15 +129,17 @@ Panel error_panel(const Table& table, const std::vector<Drawn>& setups, bool tur
   double last = 0.0;
   for (const Drawn& drawn : setups) {
     const double band = band_Hz(drawn.error_of_Hz, asked_limit);
-    if (!(band > last) || !(band < 0.99 * drawn.error_of_Hz.rbegin()->first)) continue;
+    if (!(band > 0.0) || !(band < 0.99 * drawn.error_of_Hz.rbegin()->first)) continue;
+    if (turning && &drawn != &least_of(setups)) continue;
     const std::string how = turning              ? ""
                             : !drawn.looks_ahead ? ": plain"
                             : drawn.torque       ? ": and torque"
                                                  : ": lookahead";
     panel.notes.push_back({band, 100.0 * asked_limit, number_text(band, 2) + " Hz" + how,
-                           last > 0.5 * band ? Note::Side::below : Note::Side::left});
+                           last > 0.5 * band ? Note::Side::right
+                           : turning         ? Note::Side::above
+                                             : Note::Side::left});
     last = band;
-    if (turning) break;
   }
   return panel;
 }
@@ -154,8 +162,7 @@ std::string fidelity_answer(const Table& table) {
 std::string fidelity_turning_answer(const Table& table) {
   const std::vector<Drawn> setups = usual_setups(table, Way::turning);
   if (setups.empty()) return "What the hand feels of a tool that it turns";
-  const Drawn& least =
-      *std::ranges::min_element(setups, {}, [](const Drawn& drawn) { return band_Hz(drawn.error_of_Hz, asked_limit); });
+  const Drawn& least = least_of(setups);
   std::string inertias = number_text(setups.front().mass, 3);
   if (setups.size() > 1) inertias += " to " + number_text(setups.back().mass, 3);
   return timestep_text() + inertias + " kg m² " + (setups.size() > 1 ? "all feel" : "feels") + " right within " +

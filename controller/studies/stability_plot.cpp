@@ -59,7 +59,6 @@ class Points {
 // The mass that is enough for a hand up to some stiffness, at one timestep and delay.
 struct Enough {
   double period_s = 0.0, delay_s = 0.0, mass_kg = 0.0, up_to_N_per_m = 0.0;
-  double none_from_N_per_m = 0.0;  // 0: all of the stiffnesses have a stable mass
 };
 
 Enough enough_of(const Table& table, double delay_s) {
@@ -74,10 +73,7 @@ Enough enough_of(const Table& table, double delay_s) {
     smallest_kg[points.value(row, "stiffness_N_per_m")] = points.value(row, "predicted_kg");
   }
   for (const auto& [stiffness, mass_kg] : smallest_kg) {
-    if (!(mass_kg > 0.0)) {
-      found.none_from_N_per_m = stiffness;
-      break;
-    }
+    if (!(mass_kg > 0.0)) break;
     found.mass_kg = std::max(found.mass_kg, mass_kg);
     found.up_to_N_per_m = stiffness;
   }
@@ -121,15 +117,16 @@ Map map_of(const Table& table, const Points& points, const Hold& hold, double de
 
 MapChart stability_chart(const Table& table) {
   const Points points(table);
-  MapChart chart{
-      .title = stability_answer(table),
-      .subtitle = "Colour: the smallest mass that is stable, found by simulation (order 1, drives of 100 Hz)",
-      .note = "Grey: no mass up to 1000 kg is stable. White dots: the stiffest hands of the title.",
-      .z_label = "mass (kg)",
-      .z_least = 1e-2,
-      .columns = 3,
-      .x_ticks = {0.25, 0.5, 1.0, 2.0, 4.0, 8.0},
-      .y_ticks = {100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0}};
+  MapChart chart{.title = stability_answer(table),
+                 .subtitle =
+                     "Colour: the smallest virtual mass that is stable, found by simulation (order 1, drives of 100 "
+                     "Hz); each cell is one grid point, drawn around it",
+                 .note = "Grey: no mass up to 1000 kg is stable.",
+                 .z_label = "mass (kg)",
+                 .z_least = 1e-2,
+                 .columns = 3,
+                 .x_ticks = {0.25, 0.5, 1.0, 2.0, 4.0, 8.0},
+                 .y_ticks = {100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0}};
   if (points.grid("period_s").empty()) return chart;
   const std::vector<double> delays = drawn_delays(points);
   chart.columns = static_cast<int>(delays.size());
@@ -140,7 +137,8 @@ MapChart stability_chart(const Table& table) {
     const Enough enough = enough_of(table, delays[i]);
     if (!(enough.mass_kg > 0.0)) continue;
     chart.maps[delays.size() + i].notes.push_back(
-        {1e3 * enough.period_s, enough.up_to_N_per_m, "here " + enough_text(enough.mass_kg), Note::Side::below});
+        {1e3 * enough.period_s, enough.up_to_N_per_m,
+         number_text(enough.up_to_N_per_m, 3) + " N/m, " + enough_text(enough.mass_kg), Note::Side::below});
   }
   return chart;
 }
@@ -222,21 +220,17 @@ Chart agreement_chart(const Table& table) {
 }  // namespace
 
 std::string stability_answer(const Table& table) {
-  const Points points(table);
-  std::string list;
-  Enough last;
-  for (const double delay : drawn_delays(points)) {
+  std::vector<Enough> limits;
+  for (const double delay : drawn_delays(Points(table))) {
     const Enough enough = enough_of(table, delay);
-    if (!(enough.mass_kg > 0.0)) continue;
-    const bool all = !(enough.none_from_N_per_m > 0.0);
-    list += (list.empty() ? " " : ", ") + number_text(enough.up_to_N_per_m, 3) + " N/m" +
-            (all ? " (the stiffest that was tried)" : "") + " with " + (list.empty() ? "a delay of " : "") +
-            delay_text(delay);
-    last = enough;
+    if (enough.mass_kg > 0.0) limits.push_back(enough);
   }
-  if (list.empty()) return "Which mass is stable";
-  return "The longer the delay, the softer the hand must be: at a timestep of " + milliseconds(last.period_s) +
-         " up to" + list + " (hand of " + number_text(heavy.mass_kg, 2) + " kg)";
+  if (limits.empty()) return "Which mass is stable";
+  const auto newtons = [](const Enough& limit) { return number_text(limit.up_to_N_per_m, 3) + " N/m"; };
+  std::string range = "up to " + newtons(limits.back());
+  if (limits.size() > 1) range = "from " + newtons(limits.front()) + " down to " + newtons(limits.back());
+  return "The longer the delay, the softer the hand must be: " + range + " at a timestep of " +
+         milliseconds(limits.back().period_s) + " (dots)";
 }
 
 std::string agreement_answer(const Table& table) {

@@ -27,18 +27,14 @@ TEST_F(StabilityAnswer, SaysUpToWhichStiffnessAndFromWhichOnNoMassIsStable) {
   add(1.2e-3, 878.8, 0.951, 0.951);
   add(1.2e-3, 1357.2, -1.0, -1.0);
   add(8e-3, 100.0, 5.0, 5.0);  // not asked about
-  EXPECT_EQ(
-      stability_answer(table),
-      "The longer the delay, the softer the hand must be: at a timestep of 1.2 ms up to 879 N/m with a delay of T + "
-      "16 ms (hand of 1 kg)");
+  EXPECT_EQ(stability_answer(table),
+            "The longer the delay, the softer the hand must be: up to 879 N/m at a timestep of 1.2 ms (dots)");
 }
 
 TEST_F(StabilityAnswer, SaysWhereAllStiffnessesHaveAStableMass) {
   add(1e-3, 100.0, 0.5, 0.5);
-  EXPECT_EQ(
-      stability_answer(table),
-      "The longer the delay, the softer the hand must be: at a timestep of 1 ms up to 100 N/m (the stiffest that was "
-      "tried) with a delay of T + 16 ms (hand of 1 kg)");
+  EXPECT_EQ(stability_answer(table),
+            "The longer the delay, the softer the hand must be: up to 100 N/m at a timestep of 1 ms (dots)");
 }
 
 TEST_F(StabilityAnswer, ClaimsNothingWhereNoMassIsStableOrNothingWasMeasured) {
