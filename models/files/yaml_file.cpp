@@ -185,25 +185,55 @@ void YamlNode::require_map() const {
 
 const YamlNode::Item* YamlNode::child(std::string_view key) const {
   if (!is_map()) return nullptr;
-  std::vector<std::string>& asked = item_->asked;
-  if (std::find(asked.begin(), asked.end(), key) == asked.end()) asked.emplace_back(key);
   if (is_heard()) note(*this, key, {.kind = Note::asked});
-  for (const Item* item : item_->children) {
-    if (item->key == key) return item;
+  const Item* found = nullptr;
+  for (const Item* map = item_; map != nullptr; map = map->defaults) {
+    if (std::find(map->asked.begin(), map->asked.end(), key) == map->asked.end()) map->asked.emplace_back(key);
+    if (found == nullptr) found = map->own(key);
   }
-  return nullptr;
+  return found;
+}
+
+void YamlNode::Item::default_to(const Item& other) const {
+  if (kind != Kind::map || other.kind != Kind::map) return;
+  defaults = &other;
+  for (const Item* item : children) {
+    if (const Item* same = other.own(item->key)) item->default_to(*same);
+  }
+}
+
+void YamlNode::default_to(const YamlNode& other) const { item_->default_to(*other.item_); }
+
+void YamlNode::default_to(std::string_view key, const YamlNode& other) const {
+  if (!is_map()) return;
+  const Item* map = item_->own(key);
+  if (map == nullptr) {
+    Item& empty = document_->items.emplace_back();
+    empty.kind = Item::Kind::map;
+    empty.key = key;
+    empty.line = empty.key_line = item_->line;
+    empty.column = empty.key_column = item_->column;
+    empty.parent = item_;
+    item_->children.push_back(&empty);
+    map = &empty;
+  }
+  map->default_to(*other.item_);
 }
 
 SetupError YamlNode::missing(std::string_view key, std::string expected) const {
-  // The error names the parent's line or, if one of its keys looks like a misspelling of this one, that key's line.
-  std::vector<std::string> unknown;
-  const std::vector<std::string>& asked = item_->asked;
-  for (const Item* item : item_->children) {
-    if (std::find(asked.begin(), asked.end(), item->key) == asked.end()) unknown.push_back(item->key);
+  // The error names the parent's line or, if one of its keys looks like a misspelling of this one, that key.
+  std::string found = "nothing", advice;
+  for (const Item* map = item_; map != nullptr; map = map->defaults) {
+    std::vector<std::string> unknown;
+    for (const Item* item : map->children) {
+      if (std::find(map->asked.begin(), map->asked.end(), item->key) == map->asked.end()) unknown.push_back(item->key);
+    }
+    const std::string slip = nearest(key, unknown);
+    const std::string where = map == item_ ? "below" : "in line " + std::to_string(map->line_of(slip));
+    if (advice.empty() && !slip.empty()) advice = "is " + in_quotes(slip) + " " + where + " meant to be it?";
+    if (map != item_) found += ", nor in " + YamlNode(document_, *map).path();
   }
-  const std::string slip = nearest(key, unknown);
-  return error_at(key, std::move(expected), "nothing",
-                  slip.empty() ? "" : "is " + in_quotes(slip) + " below meant to be it?");
+  return error_at(key, std::move(expected), std::move(found), std::move(advice));
 }
 
 YamlNode YamlNode::required(std::string_view key, const std::string& expected) const {
@@ -248,7 +278,11 @@ std::vector<YamlNode> YamlNode::list(std::string_view key, std::size_t min_size,
 std::vector<std::string> YamlNode::keys() const {
   require_map();
   std::vector<std::string> names;
-  for (const Item* item : item_->children) names.push_back(item->key);
+  for (const Item* map = item_; map != nullptr; map = map->defaults) {
+    for (const Item* item : map->children) {
+      if (std::find(names.begin(), names.end(), item->key) == names.end()) names.push_back(item->key);
+    }
+  }
   for (const std::string& name : names) static_cast<void>(child(name));
   if (is_heard()) note(*this, {}, {.kind = Note::names});
   return names;

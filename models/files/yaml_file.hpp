@@ -103,6 +103,13 @@ class YamlNode {
   // ... or must be a readable file.
   [[nodiscard]] std::filesystem::path existing_file(std::string_view key) const;
 
+  // From now on the keys that this map doesn't have are those of `defaults`, a map of the same file; of a map that both
+  // have, key by key. Errors name the place where a value stands. Keys that are asked of this map are known to finish()
+  // in `defaults`, too. Nothing happens where this is no map.
+  void default_to(const YamlNode& defaults) const;
+  // The same for the map behind that key, which is an empty one from now on where it isn't there.
+  void default_to(std::string_view key, const YamlNode& defaults) const;
+
   // This node itself, for elements of lists.
   [[nodiscard]] double as_number(Range range = any_number()) const;
   [[nodiscard]] std::int64_t as_integer(std::int64_t min, std::int64_t max) const;
