@@ -31,7 +31,8 @@ SetupError in_cell(const Cell& cell, const std::string& list, std::size_t index,
   try {
     const auto root = description::YamlNode::load(cell.file);
     const auto node = element ? description::drive_nodes(root).at(index) : root.map(list);
-    return node.error_at(key, expected, found, advice);
+    const SetupError mistake = node.error_at(key, expected, found, advice);
+    return element ? description::of_drive(node, mistake) : mistake;
   } catch (const std::exception&) {  // the cell was never in a file
     const std::string place = element ? list + "[" + std::to_string(index) + "]" : list;
     return SetupError({.file = cell.file.string(),

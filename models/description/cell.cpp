@@ -264,16 +264,12 @@ DriveDescription read_drive_of(const YamlNode& node, const Cell& cell) {
   return drive;
 }
 
-// What is wrong for one drive may be right for another: a mistake in what they share names the drive.
 void read_drives(const YamlNode& root, Cell& cell) {
   for (const YamlNode& node : drive_nodes(root)) {
     try {
       cell.drives.push_back(read_drive_of(node, cell));
-    } catch (const SetupError& error) {
-      SetupProblem problem = error.problem();
-      if (!is_shared(problem.key)) throw;
-      problem.advice += (problem.advice.empty() ? "" : "; ") + node.path() + " has it from there";
-      throw SetupError(std::move(problem));
+    } catch (const SetupError& mistake) {
+      throw of_drive(node, mistake);
     }
   }
 }

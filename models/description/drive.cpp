@@ -213,8 +213,12 @@ std::vector<YamlNode> drive_nodes(const YamlNode& root) {
   return nodes;
 }
 
-bool is_shared(std::string_view dotted) noexcept {
-  return dotted.starts_with(std::string(shared) + ".") || dotted.starts_with(std::string(shared_simulation) + ".");
+SetupError of_drive(const YamlNode& entry, const SetupError& mistake) {
+  SetupProblem problem = mistake.problem();
+  const std::string map = problem.key.substr(0, problem.key.find('.'));
+  if (map != shared && map != shared_simulation) return mistake;
+  problem.advice += (problem.advice.empty() ? "" : "; ") + entry.path() + " has it from there";
+  return SetupError(std::move(problem));
 }
 
 DriveDescription read_drive(const YamlNode& node) {

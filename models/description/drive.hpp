@@ -1,7 +1,6 @@
 // The entries of a cell's `drives`, with what all of them share in its `drive_defaults` and `simulation_defaults`.
 #pragma once
 
-#include <string_view>
 #include <vector>
 
 #include "models/description/cell.hpp"
@@ -13,8 +12,9 @@ namespace proxarm::description {
 // `simulation` doesn't have in `simulation_defaults`. Throws SetupError.
 std::vector<YamlNode> drive_nodes(const YamlNode& root);
 
-// Whether a key, dotted from the root, stands in one of these two.
-bool is_shared(std::string_view dotted) noexcept;
+// The same mistake, of a value that such an entry may have from one of these two: what is wrong for one drive may be
+// right for another, so the message names the drive.
+SetupError of_drive(const YamlNode& entry, const SetupError& mistake);
 
 // What such an entry says. Throws SetupError.
 DriveDescription read_drive(const YamlNode& node);

@@ -122,7 +122,8 @@ class YamlNode {
   [[nodiscard]] std::vector<YamlNode> as_list(std::size_t min_size = 0,
                                               std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
 
-  // Throws on the first key, here or anywhere below, that nobody has asked for; names the nearest known key.
+  // Throws on the first key, here or anywhere below, that nobody has asked for; names the nearest known key, or the map
+  // beside or within that one of which it is a key.
   // Call it on the root when all has been read.
   void finish() const;
 
@@ -140,6 +141,7 @@ class YamlNode {
   YamlNode(std::shared_ptr<const Document> document, const Item& item) : document_(std::move(document)), item_(&item) {}
   [[nodiscard]] const Item* child(std::string_view key) const;  // null if there is none
   [[nodiscard]] std::string found() const;
+  [[nodiscard]] SetupError unknown(const Item& item) const;
   [[nodiscard]] SetupError missing(std::string_view key, std::string expected) const;
   [[nodiscard]] YamlNode required(std::string_view key, const std::string& expected) const;
   void require_map() const;

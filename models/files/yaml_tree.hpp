@@ -1,6 +1,7 @@
 // The tree behind YamlNode; only yaml_file.cpp and yaml_tree.cpp include it.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <memory>
 #include <string>
@@ -38,6 +39,12 @@ struct YamlNode::Item {
     }
     return nullptr;
   }
+
+  [[nodiscard]] bool is_asked(std::string_view wanted) const {
+    return std::find(asked.begin(), asked.end(), wanted) != asked.end();
+  }
+
+  [[nodiscard]] const Item* map_with(std::string_view wanted) const;
 
   // Of a key's own line; 0: it isn't there.
   [[nodiscard]] int line_of(std::string_view wanted) const noexcept {

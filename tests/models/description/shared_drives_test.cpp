@@ -121,6 +121,15 @@ TEST(SharedDrives, AnUnknownKeyIsToldWhereItStands) {
             "cell.yaml:6: drive_defaults.bring_up.enable_timeout: unknown key; did you mean \"enable_timeout_s\"?");
 }
 
+TEST(SharedDrives, AKeyOfTheOtherMapIsToldWhereItBelongs) {
+  EXPECT_EQ(told(with("  bus: can\n", "  bus: can\n  servo_rate_Hz: 4000\n")),
+            "cell.yaml:6: drive_defaults.servo_rate_Hz: unknown key; did you mean it in simulation_defaults?");
+  EXPECT_EQ(told(with("  max_torque_Nm: 50\n", "  max_torque_Nm: 50\n  gear_ratio: 100\n")),
+            "cell.yaml:12: simulation_defaults.gear_ratio: unknown key; did you mean it in drive_defaults?");
+  EXPECT_EQ(told(with("node: 1}", "node: 1, servo_rate_Hz: 4000}")),
+            "cell.yaml:15: drives[0].servo_rate_Hz: unknown key; did you mean it in drives[0].simulation?");
+}
+
 TEST(SharedDrives, AMistakeIsToldWhereTheValueWasWrittenAndForWhichDrive) {
   EXPECT_EQ(told(with("rotor_inertia_kg_m2: 3", "rotor_inertia_kg_m2: -3")),
             "cell.yaml:9: drive_defaults.rotor_inertia_kg_m2: found -3, expected a number from 0 to 100000 kg m²; "
