@@ -255,7 +255,7 @@ class IdentifyJoints(ProgramTest):
         self.assertEqual(len(re.findall(r"\n    gear_damping_Nms_per_rad: ", first)), 1)
         self.assertAlmostEqual(float(re.search(r"\n      coulomb_friction_Nm: (\S+)", first)[1]), 25.0, delta=2.5)
         self.assertRegex(after[after.index("joint: axis_2"):after.index("joint: axis_3")],
-                         r"\n    simulation: \{.*coulomb_friction_Nm: [\d.]+, max_torque_Nm: 2500, .*\}  # little\n")
+                         r"\n    simulation: \{max_torque_Nm: 2500, .*coulomb_friction_Nm: [\d.]+, .*\}  # little\n")
         # The program reads it again, and finds no difference.
         compared = self.identify(bare, "--arm", self.cell(), "--compare")
         self.assertEqual([(joint, key) for joint, of in compared["joints"].items() for key, e in of.items()
