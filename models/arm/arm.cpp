@@ -12,6 +12,7 @@
 #include "models/arm/tool_inertia.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
+#include "models/description/drive.hpp"
 #include "models/files/yaml_file.hpp"
 #include "models/geometry/eigenvalues.hpp"
 #include "models/geometry/linear_systems.hpp"
@@ -29,8 +30,9 @@ SetupError in_cell(const Cell& cell, const std::string& list, std::size_t index,
   const bool element = list == "drives";
   try {
     const auto root = description::YamlNode::load(cell.file);
-    const auto node = element ? root.list(list).at(index) : root.map(list);
-    return node.error_at(key, expected, found, advice);
+    const auto node = element ? description::drive_nodes(root).at(index) : root.map(list);
+    const SetupError mistake = node.error_at(key, expected, found, advice);
+    return element ? description::of_drive(node, mistake) : mistake;
   } catch (const std::exception&) {  // the cell was never in a file
     const std::string place = element ? list + "[" + std::to_string(index) + "]" : list;
     return SetupError({.file = cell.file.string(),

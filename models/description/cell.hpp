@@ -25,12 +25,16 @@ class YamlNode;
 struct PoseDescription {
   std::array<double, 3> position_m{};
   std::array<double, 3> rpy_rad{};
+
+  bool operator==(const PoseDescription&) const = default;
 };
 
 struct BusDescription {
   std::string name;
   std::int64_t bitrate = 1'000'000;  // bit/s, arbitration phase
   std::int64_t data_bitrate = 0;     // bit/s, CAN FD data phase; 0 for a classic bus
+
+  bool operator==(const BusDescription&) const = default;
 };
 
 // A line with Modbus drives, a Modbus sensor, or both: a TCP connection to each of them, or one serial line for all. A
@@ -47,6 +51,8 @@ struct ModbusLineDescription {
   bool echo = false;  // RTU: the adapter receives what it sends, as some on RS-485 do
 
   [[nodiscard]] bool serial() const noexcept { return host.empty(); }
+
+  bool operator==(const ModbusLineDescription&) const = default;
 };
 
 // The behaviour of a joint's drive that only a simulation needs to know.
@@ -74,6 +80,8 @@ struct SimulatedDrive {
   // "strict", "latching", "lazy", "holding", "insisting": sim/canopen/stack_behaviour.hpp
   std::string stack = "strict";
   std::optional<double> brake_release_s;  // from enabling to where the target is followed; none: 0.03
+
+  bool operator==(const SimulatedDrive&) const = default;
 };
 
 // How a drive with an incremental encoder finds its zero after power on: its own homing, CiA 402's mode 6.
@@ -84,6 +92,8 @@ struct HomingDescription {
   double acceleration_rad_per_s2 = 0.0;  // 609Ah
   double angle_rad = 0.0;                // of the joint where the zero is; its counts there go to 607Ch
   double timeout_s = 60.0;
+
+  bool operator==(const HomingDescription&) const = default;
 };
 
 // Objects that a CANopen drive has elsewhere than the profile CiA 402 says, as index << 8 | sub-index.
@@ -92,12 +102,16 @@ struct DriveObjects {
   std::uint32_t controlword = 0x604000, statusword = 0x604100, position = 0x606400, torque = 0x607700;
   std::uint32_t mode = 0x606000, mode_display = 0x606100, supported_modes = 0x650200;
   std::uint32_t interpolation_value = 0x60C201, interpolation_index = 0x60C202;
+
+  bool operator==(const DriveObjects&) const = default;
 };
 
 // One more object in the drive's TPDO1.
 struct DriveFeedback {
   std::uint32_t object = 0;  // index << 8 | sub-index
   std::uint8_t bits = 0;     // 8, 16, 32
+
+  bool operator==(const DriveFeedback&) const = default;
 };
 
 // Of `gear_torque`: what comes later damps nothing at the frequencies that arms swing with.
@@ -111,6 +125,8 @@ struct GearTorque {
   double Nm_per_count = 0.0;           // by the joint's sense, may be negative; 0: a second encoder
   double counts_per_revolution = 0.0;  // of the second encoder, at the joint, likewise
   double delay_s = 0.0;                // from the gear to the SYNC whose TPDO has it
+
+  bool operator==(const GearTorque&) const = default;
 };
 
 // An object that is written before the PDOs are mapped, and read back.
@@ -118,6 +134,8 @@ struct StartUpWrite {
   std::uint32_t object = 0;  // index << 8 | sub-index
   std::uint8_t bits = 0;     // 8, 16, 32
   std::uint32_t value = 0;   // as the bytes are
+
+  bool operator==(const StartUpWrite&) const = default;
 };
 
 // What stops a drive by itself when the controller is gone.
@@ -139,6 +157,8 @@ struct BringUp {
   std::uint16_t controlword_bits = 0;  // set with `enable operation`, besides the mode's own
   std::vector<std::uint32_t> skip;     // optional objects that aren't touched, as index << 8 | sub-index
   std::vector<StartUpWrite> write;     // in this order
+
+  bool operator==(const BringUp&) const = default;
 };
 
 // Bits of the controlword that a mode or a maker may want set (CiA 402: 4 to 6 and 9, the mode's; 11 to 15, the
@@ -182,6 +202,8 @@ struct DriveDescription {
   [[nodiscard]] double counts_per_rad() const noexcept;                // signed by `direction`
   [[nodiscard]] double angle_rad(std::int32_t counts) const noexcept;  // of the motor, at the joint
   [[nodiscard]] bool on_can() const noexcept { return profile != "modbus"; }
+
+  bool operator==(const DriveDescription&) const = default;
 };
 
 struct ToolDescription {
@@ -190,6 +212,8 @@ struct ToolDescription {
   std::array<double, 6> inertia_kg_m2{};  // ixx iyy izz ixy ixz iyz about the centre of mass, axes of S
   PoseDescription handle_S;               // X_ST: the rendered point and its axes
   std::string shape;                      // path of a tool file, absolute; empty: what is rendered is a point
+
+  bool operator==(const ToolDescription&) const = default;
 };
 
 struct SensorPlacement {
@@ -207,6 +231,8 @@ struct SensorPlacement {
   double delay_s = 0.0;         // by which its readings are older than that
   // By which its zero may differ from the one that is known when it is tared; 0: zero_drift_N() of its range.
   double zero_drift_N = 0.0;
+
+  bool operator==(const SensorPlacement&) const = default;
 };
 
 inline constexpr double longest_sensor_delay_s = 0.1;
@@ -215,6 +241,8 @@ inline constexpr double longest_sensor_delay_s = 0.1;
 struct BoxDescription {
   std::array<double, 3> min_m{};
   std::array<double, 3> max_m{};
+
+  bool operator==(const BoxDescription&) const = default;
 };
 
 struct CellLimits {
@@ -237,6 +265,8 @@ struct CellLimits {
                                         std::numeric_limits<double>::infinity()};
   std::vector<BoxDescription> keep_out;  // where the rendered point may not go
   double setpoint_bandwidth_Hz = 25.0;   // of the filter that keeps elastic gears from ringing; 0: none
+
+  bool operator==(const CellLimits&) const = default;
 };
 
 // What a cell says it is used for, and what is therefore required of it (profile.hpp).
@@ -264,6 +294,8 @@ struct Cell {
   double default_mass_kg = 4.0, default_damping_Ns_per_m = 0.0;
   std::string default_scene;  // path, absolute (in the cell's file: relative to its folder); may be empty
   std::string default_hand;   // likewise
+
+  bool operator==(const Cell&) const = default;
 };
 
 // Reads and checks a cell: all that can be checked without its URDF. The file's keys are the names of the fields above,

@@ -57,6 +57,8 @@ struct SupervisionDescription {
   double bus_loss_stop_s = 0.06;  // within which each drive on CAN stops by itself when the controller is gone
   std::string brake_release;      // how a person opens the brakes by hand; empty: not at all
   std::map<std::string, std::string> reactions;  // by the fault's name; a choice of reaction_choices()
+
+  bool operator==(const SupervisionDescription&) const = default;
 };
 
 // The second contact of an enabling switch with three positions, in the same object or message: it says that the switch
@@ -65,6 +67,8 @@ struct PanicContact {
   int byte = 0;             // of the message's data
   int bit = 0;              // of that byte; of a drive's object, 0 to 31
   bool squeezed_is = true;  // what the bit is while the switch is squeezed through
+
+  bool operator==(const PanicContact&) const = default;
 };
 
 // One bit that says that the person's enabling switch is pressed; with three positions, that it is in the middle one.
@@ -79,6 +83,8 @@ struct EnablingInputDescription {
   bool pressed_is = true;           // what the bit is while the switch is pressed
   double timeout_s = 0.05;          // a message that is older says nothing: released
   std::optional<PanicContact> three_position;
+
+  bool operator==(const EnablingInputDescription&) const = default;
 };
 
 // `node` is the map under the key. Buses and drives are for the caller to check.

@@ -185,25 +185,55 @@ void YamlNode::require_map() const {
 
 const YamlNode::Item* YamlNode::child(std::string_view key) const {
   if (!is_map()) return nullptr;
-  std::vector<std::string>& asked = item_->asked;
-  if (std::find(asked.begin(), asked.end(), key) == asked.end()) asked.emplace_back(key);
   if (is_heard()) note(*this, key, {.kind = Note::asked});
-  for (const Item* item : item_->children) {
-    if (item->key == key) return item;
+  const Item* found = nullptr;
+  for (const Item* map = item_; map != nullptr; map = map->defaults) {
+    if (!map->is_asked(key)) map->asked.emplace_back(key);
+    if (found == nullptr) found = map->own(key);
   }
-  return nullptr;
+  return found;
+}
+
+void YamlNode::Item::default_to(const Item& other) const {
+  if (kind != Kind::map || other.kind != Kind::map) return;
+  defaults = &other;
+  for (const Item* item : children) {
+    if (const Item* same = other.own(item->key)) item->default_to(*same);
+  }
+}
+
+void YamlNode::default_to(const YamlNode& other) const { item_->default_to(*other.item_); }
+
+void YamlNode::default_to(std::string_view key, const YamlNode& other) const {
+  if (!is_map()) return;
+  const Item* map = item_->own(key);
+  if (map == nullptr) {
+    Item& empty = document_->items.emplace_back();
+    empty.kind = Item::Kind::map;
+    empty.key = key;
+    empty.line = empty.key_line = item_->line;
+    empty.column = empty.key_column = item_->column;
+    empty.parent = item_;
+    item_->children.push_back(&empty);
+    map = &empty;
+  }
+  map->default_to(*other.item_);
 }
 
 SetupError YamlNode::missing(std::string_view key, std::string expected) const {
-  // The error names the parent's line or, if one of its keys looks like a misspelling of this one, that key's line.
-  std::vector<std::string> unknown;
-  const std::vector<std::string>& asked = item_->asked;
-  for (const Item* item : item_->children) {
-    if (std::find(asked.begin(), asked.end(), item->key) == asked.end()) unknown.push_back(item->key);
+  // The error names the parent's line or, if one of its keys looks like a misspelling of this one, that key.
+  std::string found = "nothing", advice;
+  for (const Item* map = item_; map != nullptr; map = map->defaults) {
+    std::vector<std::string> slips;
+    for (const Item* item : map->children) {
+      if (!map->is_asked(item->key)) slips.push_back(item->key);
+    }
+    const std::string slip = nearest(key, slips);
+    const std::string where = map == item_ ? "below" : "in line " + std::to_string(map->line_of(slip));
+    if (advice.empty() && !slip.empty()) advice = "is " + in_quotes(slip) + " " + where + " meant to be it?";
+    if (map != item_) found += ", nor in " + YamlNode(document_, *map).path();
   }
-  const std::string slip = nearest(key, unknown);
-  return error_at(key, std::move(expected), "nothing",
-                  slip.empty() ? "" : "is " + in_quotes(slip) + " below meant to be it?");
+  return error_at(key, std::move(expected), std::move(found), std::move(advice));
 }
 
 YamlNode YamlNode::required(std::string_view key, const std::string& expected) const {
@@ -248,7 +278,11 @@ std::vector<YamlNode> YamlNode::list(std::string_view key, std::size_t min_size,
 std::vector<std::string> YamlNode::keys() const {
   require_map();
   std::vector<std::string> names;
-  for (const Item* item : item_->children) names.push_back(item->key);
+  for (const Item* map = item_; map != nullptr; map = map->defaults) {
+    for (const Item* item : map->children) {
+      if (std::find(names.begin(), names.end(), item->key) == names.end()) names.push_back(item->key);
+    }
+  }
   for (const std::string& name : names) static_cast<void>(child(name));
   if (is_heard()) note(*this, {}, {.kind = Note::names});
   return names;
@@ -418,24 +452,37 @@ std::array<double, 3> YamlNode::as_vec3(Range range) const {
   return {values[0], values[1], values[2]};
 }
 
-void YamlNode::finish() const {
-  if (is_map()) {
-    const std::vector<std::string>& asked = item_->asked;
-    for (const Item* item : item_->children) {
-      if (std::find(asked.begin(), asked.end(), item->key) == asked.end()) {
-        const std::string meant = nearest(item->key, asked);
-        const std::string known = asked.empty() ? "" : "known here: " + one_of(asked);
-        YamlNode node(document_, *item);
-        SetupProblem problem = node.error("a known key").problem();
-        problem.line = item->key_line;
-        problem.column = item->key_column;
-        problem.message = "unknown key";
-        problem.found.clear();
-        problem.expected.clear();
-        problem.advice = meant.empty() ? known : "did you mean " + in_quotes(meant) + "?";
-        throw SetupError(std::move(problem));
-      }
+// The map beside this one, or within it, of which that is a key; null: none.
+const YamlNode::Item* YamlNode::Item::map_with(std::string_view wanted) const {
+  for (const Item* around : {parent, this}) {
+    if (around == nullptr || around->kind != Kind::map) continue;
+    for (const Item* map : around->children) {
+      if (map->kind == Kind::map && map->is_asked(wanted)) return map;
     }
+  }
+  return nullptr;
+}
+
+SetupError YamlNode::unknown(const Item& item) const {
+  const std::vector<std::string>& asked = item_->asked;
+  const std::string meant = nearest(item.key, asked);
+  const std::string known = asked.empty() ? "" : "known here: " + one_of(asked);
+  SetupProblem problem = YamlNode(document_, item).error("a known key").problem();
+  problem.line = item.key_line;
+  problem.column = item.key_column;
+  problem.message = "unknown key";
+  problem.found.clear();
+  problem.expected.clear();
+  problem.advice = meant.empty() ? known : "did you mean " + in_quotes(meant) + "?";
+  if (const Item* other = item_->map_with(item.key)) {
+    problem.advice = "did you mean it in " + YamlNode(document_, *other).path() + "?";
+  }
+  return SetupError(std::move(problem));
+}
+
+void YamlNode::finish() const {
+  for (const Item* item : item_->children) {
+    if (is_map() && !item_->is_asked(item->key)) throw unknown(*item);
   }
   for (const Item* item : item_->children) YamlNode(document_, *item).finish();
 }

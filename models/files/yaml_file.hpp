@@ -103,6 +103,13 @@ class YamlNode {
   // ... or must be a readable file.
   [[nodiscard]] std::filesystem::path existing_file(std::string_view key) const;
 
+  // From now on the keys that this map doesn't have are those of `defaults`, a map of the same file; of a map that both
+  // have, key by key. Errors name the place where a value stands. Keys that are asked of this map are known to finish()
+  // in `defaults`, too. Nothing happens where this is no map.
+  void default_to(const YamlNode& defaults) const;
+  // The same for the map behind that key, which is an empty one from now on where it isn't there.
+  void default_to(std::string_view key, const YamlNode& defaults) const;
+
   // This node itself, for elements of lists.
   [[nodiscard]] double as_number(Range range = any_number()) const;
   [[nodiscard]] std::int64_t as_integer(std::int64_t min, std::int64_t max) const;
@@ -115,7 +122,8 @@ class YamlNode {
   [[nodiscard]] std::vector<YamlNode> as_list(std::size_t min_size = 0,
                                               std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
 
-  // Throws on the first key, here or anywhere below, that nobody has asked for; names the nearest known key.
+  // Throws on the first key, here or anywhere below, that nobody has asked for; names the nearest known key, or the map
+  // beside or within that one of which it is a key.
   // Call it on the root when all has been read.
   void finish() const;
 
@@ -133,6 +141,7 @@ class YamlNode {
   YamlNode(std::shared_ptr<const Document> document, const Item& item) : document_(std::move(document)), item_(&item) {}
   [[nodiscard]] const Item* child(std::string_view key) const;  // null if there is none
   [[nodiscard]] std::string found() const;
+  [[nodiscard]] SetupError unknown(const Item& item) const;
   [[nodiscard]] SetupError missing(std::string_view key, std::string expected) const;
   [[nodiscard]] YamlNode required(std::string_view key, const std::string& expected) const;
   void require_map() const;

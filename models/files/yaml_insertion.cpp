@@ -45,7 +45,37 @@ std::optional<YAML::Mark> last_line(const YAML::Node& map) {
   return last;
 }
 
+std::size_t place_of(const std::string& text, const YAML::Mark& mark) {
+  return std::min(line_begin(text, mark.line) + static_cast<std::size_t>(mark.column), text.size());
+}
+
+// The first key stays so: it is what people, and programs, know a list's member by.
+bool insert_in_braces(std::string& text, const YAML::Node& map, const std::string& entry) {
+  const std::size_t begin = place_of(text, map.Mark());
+  if (begin >= text.size() || text[begin] != '{') return false;
+  if (map.size() == 0) {
+    text.insert(begin + 1, entry);
+    return true;
+  }
+  if (map.size() > 1) {
+    const std::size_t second = place_of(text, std::next(map.begin())->first.Mark());
+    text.insert(second, entry + ", ");
+    return true;
+  }
+  const YAML::Node only = map.begin()->second;
+  if (!only.IsScalar()) return false;
+  const std::size_t end = text.find('}', place_of(text, only.Mark()) + only.Scalar().size());
+  if (end == std::string::npos) return false;
+  text.insert(end, ", " + entry);
+  return true;
+}
+
 }  // namespace
+
+bool has_key(const std::string& text, const std::vector<YamlStep>& path, const std::string& key) {
+  const std::optional<YAML::Node> map = map_at(text, path);
+  return map && (*map)[key];
+}
 
 bool insert_key(std::string& text, const std::vector<YamlStep>& path, const std::string& key,
                 const std::string& value) {
@@ -53,10 +83,7 @@ bool insert_key(std::string& text, const std::vector<YamlStep>& path, const std:
   if (!map || (*map)[key]) return false;
   const std::string entry = key + ": " + value;
   if (map->Style() == YAML::EmitterStyle::Flow) {
-    const std::size_t at = line_begin(text, map->Mark().line) + static_cast<std::size_t>(map->Mark().column);
-    if (at >= text.size() || text[at] != '{') return false;
-    text.insert(at + 1, entry + (map->size() > 0 ? ", " : ""));
-    return true;
+    return insert_in_braces(text, *map, entry);
   }
   const std::optional<YAML::Mark> last = last_line(*map);
   if (!last) return false;

@@ -13,9 +13,12 @@ struct YamlStep {
 };
 
 // Puts `key: value` into the map at the end of `path`, from the file's outermost one. In a map of lines it comes behind
-// the last key that has a plain value on its own line; in one in braces it comes first. False, and nothing changed,
+// the last key that has a plain value on its own line; in one in braces behind the first. False, and nothing changed,
 // where there is no such map, it has the key, or it has no such line.
 [[nodiscard]] bool insert_key(std::string& text, const std::vector<YamlStep>& path, const std::string& key,
                               const std::string& value);
+
+// Whether there is such a map and it has the key.
+[[nodiscard]] bool has_key(const std::string& text, const std::vector<YamlStep>& path, const std::string& key);
 
 }  // namespace proxarm::description

@@ -1,6 +1,7 @@
 // The tree behind YamlNode; only yaml_file.cpp and yaml_tree.cpp include it.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <memory>
 #include <string>
@@ -20,8 +21,9 @@ struct YamlNode::Item {
   std::string key;                                         // in the parent's map
   std::size_t index = 0;                                   // in the parent's list
   int line = 0, column = 0, key_line = 0, key_column = 0;  // from 1
-  Item* parent = nullptr;
-  std::vector<Item*> children;
+  const Item* parent = nullptr;
+  mutable std::vector<Item*> children;     // an empty map is added where a reader wants defaults for it
+  mutable const Item* defaults = nullptr;  // a map with the keys that this one doesn't have
   mutable std::vector<std::string> asked;  // keys that a reader has asked for
 
   // The key that names this value: its own, or for elements of lists that of the list.
@@ -31,13 +33,33 @@ struct YamlNode::Item {
     return item->key;
   }
 
+  [[nodiscard]] const Item* own(std::string_view wanted) const noexcept {
+    for (const Item* item : children) {
+      if (item->key == wanted) return item;
+    }
+    return nullptr;
+  }
+
+  [[nodiscard]] bool is_asked(std::string_view wanted) const {
+    return std::find(asked.begin(), asked.end(), wanted) != asked.end();
+  }
+
+  [[nodiscard]] const Item* map_with(std::string_view wanted) const;
+
+  // Of a key's own line; 0: it isn't there.
+  [[nodiscard]] int line_of(std::string_view wanted) const noexcept {
+    const Item* item = own(wanted);
+    return item != nullptr ? item->key_line : 0;
+  }
+
+  void default_to(const Item& other) const;
   void heard(const std::shared_ptr<const Document>& document, const YamlFact& fact) const;
 };
 
 struct YamlNode::Document {
   std::filesystem::path file;
-  std::filesystem::path folder;  // absolute
-  std::deque<Item> items;        // stable addresses; the first is the root
+  std::filesystem::path folder;    // absolute
+  mutable std::deque<Item> items;  // stable addresses; the first is the root
 };
 
 // Why `text` is no number, where that isn't obvious.

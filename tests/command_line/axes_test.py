@@ -19,13 +19,11 @@ class Axes(ProgramTest):
     def without_drive(self, cell, joint):
         """A copied cell without this drive, its joint fixed in a URDF of its own."""
         text = (self.copies() / "models/cells" / cell).read_text()
-        drives = re.split(r"(?m)^  - joint: ", text)
-        head, tail = drives[0], []
-        at = next(i for i, part in enumerate(drives) if part.startswith(joint + "\n"))
-        last = drives[at].find("\nsensor:")  # of the last drive, what follows the drives
-        if last >= 0:
-            tail.append(drives[at][last:])
-        text = head + "".join("  - joint: " + part for i, part in enumerate(drives[1:], 1) if i != at) + "".join(tail)
+        parts = re.split(r"(?m)^(?=  - \{?joint: )", text)
+        at = next(i for i, part in enumerate(parts) if re.match(rf"  - \{{?joint: {joint}\b", part))
+        last = parts[at].find("\nsensor:")  # of the last drive, what follows the drives
+        parts[at] = parts[at][last:] if last >= 0 else ""
+        text = "".join(parts)
         start = re.search(r"start_rad: \[(.*)\]", text)[1].split(", ")
         del start[at - 1]
         text = re.sub(r"start_rad: \[.*\]", f"start_rad: [{', '.join(start)}]", text)

@@ -102,7 +102,7 @@ class Docs(ProgramTest):
         getters = ("number|number_or|integer|integer_or|boolean_or|string|string_or|choice|choice_or|vec3|vec3_or|numbers|map|find_map|"
                    "list|has|existing_file|at")
         read = set()
-        for source in ("cell.cpp", "supervision.cpp"):
+        for source in ("cell.cpp", "drive.cpp", "supervision.cpp"):
             code = (SOURCE / "models/description" / source).read_text()
             read |= set(re.findall(rf"(?:->|\.)(?:{getters})\(\s*\"(\w+)\"", code))
             read |= set(re.findall(r"(?:read_name|pose_or_identity|bandwidth_or|read_object|absolute_path_or_empty|integer_of|integer_of_or|text_like|"

@@ -8,6 +8,7 @@ import re
 import sys
 import unittest
 
+import yaml
 from harness import SOURCE, ProgramTest
 
 sys.path.insert(0, str(SOURCE / "tests/soak"))
@@ -254,11 +255,33 @@ class IdentifyJoints(ProgramTest):
         self.assertEqual(len(re.findall(r"\n    gear_damping_Nms_per_rad: ", first)), 1)
         self.assertAlmostEqual(float(re.search(r"\n      coulomb_friction_Nm: (\S+)", first)[1]), 25.0, delta=2.5)
         self.assertRegex(after[after.index("joint: axis_2"):after.index("joint: axis_3")],
-                         r"\n    simulation: \{.*coulomb_friction_Nm: [\d.]+, max_torque_Nm: 2500, .*\}  # little\n")
+                         r"\n    simulation: \{max_torque_Nm: 2500, .*coulomb_friction_Nm: [\d.]+, .*\}  # little\n")
         # The program reads it again, and finds no difference.
         compared = self.identify(bare, "--arm", self.cell(), "--compare")
         self.assertEqual([(joint, key) for joint, of in compared["joints"].items() for key, e in of.items()
                           if e.get("differs")], [])
+
+    def test_what_is_found_of_a_joint_is_written_at_it_where_all_joints_had_it_from_defaults(self):
+        arm = self.written("arm.yaml", joints_hunt.shipped("cobot"))
+        text = re.sub(r", gear_stiffness_Nm_per_rad: [\d.]+, gear_damping_Nms_per_rad: [\d.]+", "", arm.read_text())
+        text = re.sub(r",\n     simulation: \{.*\}\}", "}", text)
+        for name, keys in (("drive", "gear_stiffness_Nm_per_rad: 50000"),
+                           ("simulation", "coulomb_friction_Nm: 3\n  gear_damping_Nms_per_rad: 10\n  gear_stiffness_ratio: 1.1\n"
+                                          "  max_torque_Nm: 300")):
+            text = re.sub(rf"\n{name}_defaults:.*\n", rf"\g<0>  {keys}\n", text)
+        cell = self.written("short.yaml", text)
+        for _ in range(2):  # the second time the joint has them itself
+            outcome = self.call("identify", "--joints", cell, "--arm", arm, "--write")
+            self.assertEqual(outcome.status, 0, outcome.err)
+            before, after = yaml.safe_load(text), yaml.safe_load(cell.read_text())
+            for name in ("drive_defaults", "simulation_defaults"):
+                self.assertEqual(after[name], before[name], "what all have stays")
+            first = after["drives"][0]
+            self.assertEqual(next(iter(first)), "joint")
+            self.assertAlmostEqual(first["gear_stiffness_Nm_per_rad"], 130000, delta=6500)
+            self.assertAlmostEqual(first["simulation"]["coulomb_friction_Nm"], 4.8, delta=0.5)
+            self.assertEqual(first["simulation"]["gear_damping_Nms_per_rad"], first["gear_damping_Nms_per_rad"])
+            self.assertEqual(first["simulation"]["gear_stiffness_ratio"], 1, "the stiffness that was found is the real one")
 
     def test_a_key_that_can_not_be_put_in_is_named_and_nothing_is_written(self):
         """A drive that another line of the file is: it has no entry of its own."""

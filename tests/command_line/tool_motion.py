@@ -63,7 +63,8 @@ class Cell:
         head, drives = text.split("\ndrives:", 1)
         drives = drives.split("\nsensor:", 1)[0]
         self.urdf = self.file.parent / re.search(r"^urdf: *(\S+)", head, re.M).group(1)
-        self.drives = [{key: value for key, value in re.findall(r"(\w+): *(\[.*?\]|\S+)", drive)}
+        shared = self.keys(re.search(r"^drive_defaults:(.*?)(?=^\w)", head + "\n_", re.M | re.S))
+        self.drives = [shared | self.keys(re.search(r".*", drive, re.S))
                        for drive in re.split(r"^  - ", drives, flags=re.M)[1:]]
         gears = [d.get("gear_stiffness_Nm_per_rad") for d in self.drives]
         self.compliance = [1.0 / float(k) if k and float(k) > 0.0 else 0.0 for k in gears]
@@ -82,6 +83,11 @@ class Cell:
         tool_centre = re.search(r"centre_of_mass_S_m: *\[(.*?)\]", text).group(1)
         self.load = (float(re.search(r"^ +mass_kg: *(\S+)", text, re.M).group(1)),
                      plus(tuple(float(x) for x in mount.split(",")), tuple(float(x) for x in tool_centre.split(","))))
+
+    @staticmethod
+    def keys(found):
+        """Of a drive, or of what all have; of a key that its `simulation` has, too, that one's value."""
+        return dict(re.findall(r"(\w+): *(\[.*?\]|[^\s,{}]+)", found.group())) if found else {}
 
     @staticmethod
     def number(text, key, default):

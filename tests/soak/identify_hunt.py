@@ -61,10 +61,13 @@ def made_arm(chance, text):
                     lambda found: found[1] + flow([chance.uniform(0, MOUNTING_RAD) * x for x in direction(chance)]))
     text = replaced(text, r"\n  noise_N: [\d.]+", f"\n  noise_N: {log_uniform(chance, 0.005, 0.05):.4g}")
     text = replaced(text, r"\n  noise_Nm: [\d.]+", f"\n  noise_Nm: {log_uniform(chance, 0.0003, 0.003):.4g}")
-    gear = lambda: (f"\n      gear_hysteresis_rad: {chance.uniform(0, 1e-4):.3g}"
-                    f"\n      gear_stiffness_ratio: {chance.uniform(0.85, 1.15):.4g}")
-    text = replaced(text, r"(\n      coulomb_friction_Nm: )([\d.]+)",
-                    lambda found: f"{found[1]}{chance.uniform(0.5, 2.0) * float(found[2]):.4g}" + gear(), count=0)
+
+    def friction_and_gear(found):
+        between = ", " if found[1] == "{" else found[1]
+        return (f"{found[1]}coulomb_friction_Nm: {chance.uniform(0.5, 2.0) * float(found[2]):.4g}"
+                f"{between}gear_hysteresis_rad: {chance.uniform(0, 1e-4):.3g}"
+                f"{between}gear_stiffness_ratio: {chance.uniform(0.85, 1.15):.4g}")
+    text = replaced(text, r"(\n      |\{)coulomb_friction_Nm: ([\d.]+)", friction_and_gear, count=0)
     return text, mass_kg, centre_m
 
 

@@ -30,7 +30,8 @@ RANGES = {"gear_stiffness_Nm_per_rad": (0.7, 1.4), "rotor_inertia_kg_m2": (0.8, 
 def shipped(name):
     """The text of a shipped cell that says what its drives' torques count in."""
     path = SOURCE / f"models/cells/{name}.yaml"
-    return re.sub(r"(\n    )(max_torque_Nm: )(\S+)", r"\1rated_torque_Nm: \3\1\2\3", rooted(path.read_text(), path))
+    return re.sub(r"(\n    |, )max_torque_Nm: ([\d.]+)(?=[,\n])", r"\1rated_torque_Nm: \2\1max_torque_Nm: \2",
+                  rooted(path.read_text(), path))
 
 
 def other_links(chance, urdf):
@@ -45,10 +46,10 @@ def other_links(chance, urdf):
 
 def made_arm(chance, text, folder):
     """The text of an arm that differs from its cell's, and each joint's truth by the key that is told."""
-    parts = re.split(r"(?=\n  - joint: )", text)
+    parts = re.split(r"(?=\n  - \{?joint: )", text)
     truth = {}
     for n, part in enumerate(parts):
-        joint = re.match(r"\n  - joint: (\S+)", part)
+        joint = re.match(r"\n  - \{?joint: ([^\s,]+)", part)
         if not joint:
             continue
         values = {}

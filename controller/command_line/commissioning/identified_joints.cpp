@@ -109,12 +109,24 @@ std::string bare(const std::string& key) {
                     .expected = fresh});
 }
 
-// Puts a figure whose key the file doesn't have into the entry of its drive. Returns false where that can't be done.
-bool insert(std::string& text, const JointFigure& figure, const std::string& fresh) {
-  std::vector<description::YamlStep> map{{"drives"}, {"joint", figure.joint}};
-  const std::size_t dot = figure.key.find('.');
-  if (dot != std::string::npos) map.push_back({figure.key.substr(0, dot)});
-  return description::insert_key(text, map, bare(figure.key), fresh);
+// Puts a key that the entry of a joint's drive doesn't have into it, or into its `simulation`, which an entry that has
+// all of it from simulation_defaults gets now. Returns false where that can't be done.
+bool insert(std::string& text, const std::string& joint, const std::string& key, const std::string& fresh) {
+  const std::vector<description::YamlStep> entry{{"drives"}, {"joint", joint}};
+  const std::size_t dot = key.find('.');
+  if (dot == std::string::npos) return description::insert_key(text, entry, key, fresh);
+  const std::string map = key.substr(0, dot);
+  if (!description::has_key(text, entry, map)) {
+    return description::insert_key(text, entry, map, "{" + bare(key) + ": " + fresh + "}");
+  }
+  return description::insert_key(text, {entry[0], entry[1], {map}}, bare(key), fresh);
+}
+
+// What all simulated drives have from simulation_defaults is this one's own from now on.
+void own_simulation(std::string& text, const std::string& joint, const std::string& key, const std::string& fresh) {
+  const bool is_own = description::has_key(text, {{"drives"}, {"joint", joint}, {"simulation"}}, key);
+  if (is_own || !description::has_key(text, {{"simulation_defaults"}}, key)) return;
+  static_cast<void>(insert(text, joint, "simulation." + key, fresh));
 }
 
 std::string with_joints(const std::string& text, const std::vector<JointFigure>& figures, const Cell& cell) {
@@ -124,10 +136,14 @@ std::string with_joints(const std::string& text, const std::vector<JointFigure>&
     const std::string fresh = formatted("%.6g", figure.estimate.value);
     const int replaced = replace_all(changed, figure.joint, bare(figure.key), fresh);
     // A damping that stands only where the simulated drive has it isn't the controller's.
-    const bool inserted = (replaced == 0 || figure.key == damping_key) && insert(changed, figure, fresh);
+    const bool inserted =
+        (replaced == 0 || figure.key == damping_key) && insert(changed, figure.joint, figure.key, fresh);
     if (replaced == 0 && !inserted) refuse(cell, figure, fresh);
+    if (figure.key == damping_key) own_simulation(changed, figure.joint, damping_key, fresh);
     // The stiffness that was found is the real one, which a simulation needn't multiply any more.
-    if (figure.key == stiffness_key) replace_all(changed, figure.joint, "gear_stiffness_ratio", "1");
+    if (figure.key == stiffness_key && replace_all(changed, figure.joint, "gear_stiffness_ratio", "1") == 0) {
+      own_simulation(changed, figure.joint, "gear_stiffness_ratio", "1");
+    }
   }
   return changed;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdio>
+#include <utility>
+#include <vector>
 
 namespace proxarm::command_line {
 namespace {
@@ -36,37 +38,85 @@ std::string pose(const description::PoseDescription& X) {
   return "{position_m: " + list(X.position_m) + ", rpy_rad: " + list(X.rpy_rad) + "}";
 }
 
-std::string drive_text(const description::DriveDescription& d) {
-  std::string text = "  - joint: " + scalar(d.joint) + "\n    bus: " + d.bus + "\n    node: " + std::to_string(d.node) +
-                     "\n    profile: cia402\n    mode: csp\n";
-  if (!d.eds.empty()) text += "    eds: " + scalar(d.eds) + "\n";
-  const auto add = [&text](const char* indent, const char* key, double value) {
-    text += std::string(indent) + key + ": " + number(value) + "\n";
-  };
-  const auto own = [&](const char* key, double value) { add("    ", key, value); };
-  const auto simulated = [&](const char* key, double value) { add("      ", key, value); };
-  own("counts_per_motor_revolution", d.counts_per_motor_revolution);
-  own("gear_ratio", d.gear_ratio);
-  own("direction", d.direction);
-  own("offset_counts", d.offset_counts);
-  text += "    range_rad: " + list(d.range_rad) + "\n";
-  own("max_speed_rad_per_s", d.max_speed_rad_per_s);
-  own("max_acceleration_rad_per_s2", d.max_acceleration_rad_per_s2);
-  own("rotor_inertia_kg_m2", d.rotor_inertia_kg_m2);
-  own("position_bandwidth_Hz", d.position_bandwidth_Hz);
-  own("gear_stiffness_Nm_per_rad", d.gear_stiffness_Nm_per_rad);
-  own("gear_damping_Nms_per_rad", d.gear_damping_Nms_per_rad.value_or(0.0));
-  own("max_torque_Nm", d.max_torque_Nm);
-  text += "    simulation:\n";
-  simulated("coulomb_friction_Nm", d.simulation.coulomb_friction_Nm);
-  simulated("viscous_friction_Nms_per_rad", d.simulation.viscous_friction_Nms_per_rad);
-  simulated("gear_damping_Nms_per_rad", d.simulation.gear_damping_Nms_per_rad);
-  simulated("max_torque_Nm", d.simulation.max_torque_Nm);
-  simulated("position_gain_per_s", d.simulation.position_gain_per_s);
-  simulated("velocity_bandwidth_Hz", d.simulation.velocity_bandwidth_Hz);
-  simulated("velocity_feedforward", 1.0);
-  simulated("acceleration_feedforward", 1.0);
-  simulated("servo_rate_Hz", d.simulation.servo_rate_Hz);
+// Keys and what they say.
+using Keys = std::vector<std::pair<std::string, std::string>>;
+
+// What is usually the same for all drives, and for how all of them are simulated.
+Keys common_keys(const description::DriveDescription& d) {
+  Keys keys{{"profile", "cia402"}, {"mode", "csp"}};
+  if (!d.eds.empty()) keys.emplace_back("eds", scalar(d.eds));
+  keys.insert(keys.end(), {{"counts_per_motor_revolution", number(d.counts_per_motor_revolution)},
+                           {"gear_ratio", number(d.gear_ratio)},
+                           {"direction", number(d.direction)},
+                           {"offset_counts", number(d.offset_counts)},
+                           {"position_bandwidth_Hz", number(d.position_bandwidth_Hz)}});
+  return keys;
+}
+
+Keys common_keys(const description::SimulatedDrive& s) {
+  return {{"position_gain_per_s", number(s.position_gain_per_s)},
+          {"velocity_bandwidth_Hz", number(s.velocity_bandwidth_Hz)},
+          {"velocity_feedforward", number(s.velocity_feedforward)},
+          {"acceleration_feedforward", number(s.acceleration_feedforward)},
+          {"servo_rate_Hz", number(s.servo_rate_Hz)}};
+}
+
+// Those of the first drive's that all others have, too.
+template <class Of>
+Keys shared(const std::vector<description::DriveDescription>& drives, Of of) {
+  Keys all = of(drives.front());
+  for (const description::DriveDescription& drive : drives) {
+    const Keys its = of(drive);
+    std::erase_if(all, [&](const auto& key) { return std::find(its.begin(), its.end(), key) == its.end(); });
+  }
+  return all;
+}
+
+Keys without(Keys keys, const Keys& others) {
+  std::erase_if(keys, [&](const auto& key) { return std::find(others.begin(), others.end(), key) != others.end(); });
+  return keys;
+}
+
+std::string in_braces(const Keys& keys) {
+  std::string text;
+  for (const auto& [key, value] : keys) text += (text.empty() ? "" : ", ") + key + ": " + value;
+  return text;
+}
+
+std::string in_lines(const std::string& name, const Keys& keys) {
+  std::string text = keys.empty() ? "" : name + ":\n";
+  for (const auto& [key, value] : keys) text += "  " + key + ": " + value + "\n";
+  return text;
+}
+
+// In lines: who it is, what it has otherwise than others, how far it goes, its gear, and how it is simulated.
+std::string drive_text(const description::DriveDescription& d, const Keys& own, const Keys& simulated) {
+  const Keys who{{"joint", scalar(d.joint)}, {"bus", d.bus}, {"node", std::to_string(d.node)}};
+  const Keys range{{"range_rad", list(d.range_rad)},
+                   {"max_speed_rad_per_s", number(d.max_speed_rad_per_s)},
+                   {"max_acceleration_rad_per_s2", number(d.max_acceleration_rad_per_s2)},
+                   {"max_torque_Nm", number(d.max_torque_Nm)}};
+  const Keys gear{{"rotor_inertia_kg_m2", number(d.rotor_inertia_kg_m2)},
+                  {"gear_stiffness_Nm_per_rad", number(d.gear_stiffness_Nm_per_rad)},
+                  {"gear_damping_Nms_per_rad", number(d.gear_damping_Nms_per_rad.value_or(0.0))}};
+  Keys simulation{{"coulomb_friction_Nm", number(d.simulation.coulomb_friction_Nm)},
+                  {"viscous_friction_Nms_per_rad", number(d.simulation.viscous_friction_Nms_per_rad)},
+                  {"gear_damping_Nms_per_rad", number(d.simulation.gear_damping_Nms_per_rad)},
+                  {"max_torque_Nm", number(d.simulation.max_torque_Nm)}};
+  simulation.insert(simulation.end(), simulated.begin(), simulated.end());
+  const std::string next = ",\n     ";
+  return "  - {" + in_braces(who) + (own.empty() ? "" : next + in_braces(own)) + next + in_braces(range) + next +
+         in_braces(gear) + next + "simulation: {" + in_braces(simulation) + "}}\n";
+}
+
+std::string drives_text(const std::vector<description::DriveDescription>& drives) {
+  const auto of_drive = [](const description::DriveDescription& d) { return common_keys(d); };
+  const auto of_simulation = [](const description::DriveDescription& d) { return common_keys(d.simulation); };
+  const Keys all = shared(drives, of_drive), all_simulated = shared(drives, of_simulation);
+  std::string text = in_lines("drive_defaults", all) + in_lines("simulation_defaults", all_simulated) + "drives:\n";
+  for (const description::DriveDescription& d : drives) {
+    text += drive_text(d, without(of_drive(d), all), without(of_simulation(d), all_simulated));
+  }
   return text;
 }
 
@@ -107,11 +157,12 @@ std::string cell_text(const description::Cell& cell, const std::vector<std::stri
     text += "  - {name: " + bus.name + ", bitrate: " + std::to_string(bus.bitrate) + "}\n";
   }
   text +=
-      "\n# counts_per_motor_revolution, gear_ratio, direction and offset_counts are placeholders: the drives' manuals "
-      "and\n"
-      "# `proxarm calibrate` have yours. ESTIMATED by rules of thumb: rotor inertia, stiffness and damping of gears,\n"
-      "# friction, and torque where the URDF doesn't say it. Of `simulation` the controller knows nothing.\ndrives:\n";
-  for (const description::DriveDescription& drive : cell.drives) text += drive_text(drive);
+      "\n# What all drives have; a drive's own keys go first. counts_per_motor_revolution, gear_ratio, direction and\n"
+      "# offset_counts are placeholders: the drives' manuals and `proxarm calibrate` have yours. ESTIMATED by rules "
+      "of\n"
+      "# thumb: rotor inertia, gears, friction, and torque where the URDF doesn't say it. `simulation` is for that "
+      "alone.\n" +
+      drives_text(cell.drives);
   text += "\nsensor:\n  description: sensor.yaml\n  bus: " + cell.sensor.bus + "\n" + sensor_keys +
           "  link: " + scalar(cell.sensor.link) +
           "\n  # z of the sensor points out of the arm, along its last joint's axis.\n  pose_link: " +

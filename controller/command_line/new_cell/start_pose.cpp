@@ -1,8 +1,8 @@
 #include "controller/command_line/new_cell/start_pose.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -20,6 +20,10 @@ constexpr int poses = 20000;
 constexpr std::size_t tried = 2000;  // of them, whether the hand's way can be gone
 // Of that way, per metre of reach up to one: less than what a call of the inverse kinematics may turn joints by.
 constexpr double step_share = 2e-3;
+// Nearer to an axis than this the tool is at it, where turning doesn't move it.
+constexpr double at_an_axis_m = 1e-3;
+// What turns the tool on a smaller circle doesn't lead it anywhere: steps that it can follow would be thousands.
+constexpr double smallest_circle_m = 0.05;
 constexpr double another_rad = 0.3;  // m of a joint that slides: half of the way of a hand
 constexpr double least_share = 0.4;  // of the start's smallest singular value, anywhere on the way
 
@@ -47,7 +51,7 @@ double reach_of(const models::Arm& arm) {
       if (!arm.slides(i)) reach_m = std::max(reach_m, tool.J_W.col(i).head<3>().norm());
     }
   }
-  return reach_m > 0.0 ? reach_m : 1.0;
+  return reach_m > at_an_axis_m ? reach_m : 1.0;
 }
 
 // Takes full turns off joints whose ranges allow more than one.
@@ -126,15 +130,18 @@ double score(const models::Arm& arm, const controller::PlaceMargin& places, cons
   return 2.0 * dexterity(arm, places, q, reach_m) + free + points + ahead - 4.0 * off - 4.0 * below;
 }
 
-bool can_be_gone(const models::Arm& arm, models::InverseKinematics inverse, const JointVector& start,
-                 const description::HandDescription& hand, double step_m) {
+// How far the arm comes on the hand's way: to its end (infinite), or so many metres of its first straight piece.
+double gone_m(const models::Arm& arm, models::InverseKinematics inverse, const JointVector& start,
+              const description::HandDescription& hand, double step_m) {
   inverse.set_posture(start);
   const double least = least_share * smallest_singular_value(inverse, arm, start);
   const models::Pose X_start = arm.tool_pose(start);
   JointVector q = start;
   Vec3 at = Vec3::Zero();
+  double first_m = 0.0;
   for (const description::Waypoint& waypoint : hand.waypoints) {
     const Vec3 to(waypoint.offset_m.data());
+    const bool is_first = first_m == 0.0;
     const int steps = static_cast<int>(std::ceil((to - at).norm() / step_m));
     for (int k = 1; k <= steps; ++k) {
       models::Pose X_WT = X_start;
@@ -143,17 +150,34 @@ bool can_be_gone(const models::Arm& arm, models::InverseKinematics inverse, cons
       inverse.solve(q, X_WT, result);
       if (result.status != models::InverseKinematicsResult::Status::converged || result.out_of_range ||
           result.smallest_singular_value_m_per_rad < least) {
-        return false;
+        return is_first ? (to - at).norm() * k / steps : first_m;
       }
       q = result.q;
     }
+    if (is_first) first_m = (to - at).norm();
     at = to;
   }
-  return true;
+  return std::numeric_limits<double>::infinity();
 }
 
+// Of the first straight piece of a hand's way, which is as long as it comes from its start in a straight line.
+double first_piece_m(const description::HandDescription& hand) {
+  for (const description::Waypoint& waypoint : hand.waypoints) {
+    const double length_m = Vec3(waypoint.offset_m.data()).norm();
+    if (length_m > 0.0) return length_m;
+  }
+  return 0.0;
+}
+
+// What was found of a pose: where the way can't be gone further on its first piece, a shorter way that goes beyond that
+// can't be gone either.
+struct Tried {
+  JointVector q;
+  double most_m = std::numeric_limits<double>::infinity();
+};
+
 // Poses all over the joints' ranges, the best first; straight ahead, or wherever the first joint has them.
-std::vector<JointVector> sorted_poses(const models::Arm& arm, double reach_m, bool ahead) {
+std::vector<Tried> sorted_poses(const models::Arm& arm, double reach_m, bool ahead) {
   struct Candidate {
     double score;
     JointVector q;
@@ -170,8 +194,8 @@ std::vector<JointVector> sorted_poses(const models::Arm& arm, double reach_m, bo
   }
   std::sort(candidates.begin(), candidates.end(),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
-  std::vector<JointVector> sorted;
-  for (std::size_t k = 0; k < tried; ++k) sorted.push_back(candidates[k].q);
+  std::vector<Tried> sorted;
+  for (std::size_t k = 0; k < tried; ++k) sorted.push_back({.q = candidates[k].q});
   return sorted;
 }
 
@@ -179,25 +203,29 @@ std::vector<JointVector> sorted_poses(const models::Arm& arm, double reach_m, bo
 
 std::vector<StartPose> find_starts(const models::Arm& arm, const description::HandDescription& hand, std::size_t most) {
   const models::InverseKinematics inverse(arm);
-  const double reach_m = reach_of(arm), step_m = step_share * std::min(reach_m, 1.0);
+  const double reach_m = reach_of(arm), step_m = step_share * std::clamp(reach_m, smallest_circle_m, 1.0);
   std::vector<StartPose> found;
   const auto is_another = [&](const JointVector& q) {
     return std::all_of(found.begin(), found.end(),
                        [&](const StartPose& start) { return (start.q - q).cwiseAbs().maxCoeff() > another_rad; });
   };
-  std::array<std::vector<JointVector>, 2> sorted;  // straight ahead, and anywhere: made when they are first needed
+  // Straight ahead, and anywhere: made when they are first needed, and all the same where the first joint slides.
+  std::vector<std::vector<Tried>> sorted(arm.slides(arm.drive_along_chain(0)) ? 1 : 2);
   for (const double share : {1.0, 0.5, 0.25, 0.1}) {
     const description::HandDescription shorter = with_shorter_way(hand, share);
-    for (std::vector<JointVector>& starts : sorted) {
+    const double piece_m = first_piece_m(shorter);
+    for (std::vector<Tried>& starts : sorted) {
       if (starts.empty()) starts = sorted_poses(arm, reach_m, &starts == &sorted[0]);
-      for (const JointVector& q : starts) {
+      for (auto& [q, most_m] : starts) {
         if (found.size() == most) break;
-        if (is_another(q) && can_be_gone(arm, inverse, q, shorter, step_m)) found.push_back({q, share});
+        if (piece_m > most_m || !is_another(q)) continue;
+        most_m = gone_m(arm, inverse, q, shorter, step_m);
+        if (std::isinf(most_m)) found.push_back({q, share});
       }
       if (!found.empty()) return found;
     }
   }
-  return {{sorted[0].front(), 0.0}};
+  return {{sorted[0].front().q, 0.0}};
 }
 
 description::HandDescription with_shorter_way(description::HandDescription hand, double share) {

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "controller/command_line/schema/json_schema.hpp"
+#include "controller/command_line/schema/wide_map.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -437,6 +438,7 @@ bool is_refused(const KeyModel& key) noexcept {
 MapModel model_of(const Specimens& specimens) {
   int contradictions = 0;
   MapModel model = Builder(specimens).build(specimens.roots(), contradictions);
+  share_keys(model, specimens);
   require_complete(model);
   return model;
 }

@@ -45,6 +45,7 @@ struct KeyCase {
   Standing standing = Standing::optional;
   std::vector<description::Json> otherwise{};  // one, or several that what else the file says chooses from
   std::vector<Alternative> value{};
+  bool is_wide = false;  // keys may stand elsewhere for all such maps, so that none of them must be here (wide_map.hpp)
 };
 
 struct KeyModel {
@@ -64,6 +65,7 @@ struct MapModel {
   std::vector<KeyModel> keys{};
   std::optional<std::string> names{};  // keys are the user's names: `keys` has one, whose cases hold for each
   std::vector<std::string> exactly_one{};
+  std::string keys_of{};  // not empty: its keys are some of the maps' at that path
 };
 
 // Throws SetupError if the specimens leave something open: a key that none of them has, a key without a meaning, a

@@ -99,6 +99,7 @@ std::string value_text(const Alternative& a) {
   std::vector<std::string> words;
   switch (a.kind) {
     case Kind::map:
+      if (!a.map->keys_of.empty()) return "map of keys of " + code(a.map->keys_of);
       return a.map->names ? "map of " + values_text(a.map->keys.front().cases.front().value) + " by names" : "map";
     case Kind::list:
       if (has_maps(a.element)) return "list of " + count_text(a, "maps");
@@ -163,16 +164,25 @@ class Cases {
   std::vector<std::pair<std::string, std::vector<std::string>>> texts_;
 };
 
+// What is told of a key whose maps may have keys elsewhere is what holds where they don't.
+std::vector<KeyCase> told(const KeyModel& key) {
+  std::vector<KeyCase> cases = key.cases;
+  if (std::erase_if(cases, [](const KeyCase& one) { return one.is_wide; }) == 0) return cases;
+  for (KeyCase& one : cases) one.when.clear();
+  return cases;
+}
+
 std::string row(const KeyModel& key, const std::string& unit) {
   Cases defaults, ranges;
-  for (const KeyCase& one : key.cases) {
+  const std::vector<KeyCase> cases = told(key);
+  for (const KeyCase& one : cases) {
     if (one.standing == Standing::refused) continue;
     defaults.add(default_text(one), one.when);
     ranges.add(values_text(one.value), one.when);
   }
   if (is_refused(key)) return "";
-  return "| " + code(key.name) + " | " + unit + " | " + defaults.text(key.cases.size()) + " | " +
-         ranges.text(key.cases.size()) + " | " + cell(key.meaning) + " |\n";
+  return "| " + code(key.name) + " | " + unit + " | " + defaults.text(cases.size()) + " | " +
+         ranges.text(cases.size()) + " | " + cell(key.meaning) + " |\n";
 }
 
 struct Table {
@@ -190,6 +200,7 @@ void collect(const std::vector<Alternative>& value, const std::string& when, std
 }
 
 void collect(const MapModel& map, const std::string& when, std::vector<Table>& tables) {
+  if (!map.keys_of.empty()) return;
   if (!map.names) {
     std::string body;
     if (!map.exactly_one.empty()) {
@@ -208,7 +219,7 @@ void collect(const MapModel& map, const std::string& when, std::vector<Table>& t
     }
   }
   for (const KeyModel& key : map.keys) {
-    for (const KeyCase& one : key.cases) {
+    for (const KeyCase& one : told(key)) {
       collect(one.value, one.when.empty() ? when : when + ", " + text_of(one.when), tables);
     }
   }

@@ -194,7 +194,12 @@ std::string Specimens::comment(const std::string& path, const std::string& key) 
 
 std::string Specimens::meaning(const std::string& path, const std::string& key) const {
   const std::string text = comment(path, key);
-  return text.starts_with("(by ") ? text.substr(text.find(") ") + 2) : text;
+  return text.starts_with("(by ") || text.starts_with("(of ") ? text.substr(text.find(") ") + 2) : text;
+}
+
+std::string Specimens::shared_by(const std::string& path, const std::string& key) const {
+  const std::string text = comment(path, key);
+  return text.starts_with("(of ") ? text.substr(4, text.find(") ") - 4) : "";
 }
 
 std::vector<std::string> Specimens::deciders(const std::string& path, const std::string& key) const {

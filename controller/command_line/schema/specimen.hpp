@@ -51,6 +51,9 @@ class Specimens {
   [[nodiscard]] std::string meaning(const std::string& path, const std::string& key) const;
   // A comment may begin with "(by KEY, KEY)": what is asked of its key differs by what those beside it say.
   [[nodiscard]] std::vector<std::string> deciders(const std::string& path, const std::string& key) const;
+  // A comment may begin with "(of PATH)": its key is a map of keys that all maps there have from it. That path, or
+  // none.
+  [[nodiscard]] std::string shared_by(const std::string& path, const std::string& key) const;
 
  private:
   void read(const std::filesystem::path& file, const std::string& kind);

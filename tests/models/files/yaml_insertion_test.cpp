@@ -44,9 +44,14 @@ TEST(YamlInsertion, ComesBehindTheLastPlainValueOfItsMapWithAllElseAsItWas) {
   EXPECT_EQ(with({{"tool"}}, "gear"), behind("  mass: 1", "  gear: 7"));
 }
 
-TEST(YamlInsertion, ComesFirstInBraces) {
+// What a list's member is known by stays its first key.
+TEST(YamlInsertion, ComesBehindTheFirstInBraces) {
   const std::string two = with({{"drives"}, {"joint", "two"}}, "damping");
-  EXPECT_NE(two.find("  - {damping: 7, joint: two, gear: 4}\n"), std::string::npos) << two;
+  EXPECT_NE(two.find("  - {joint: two, damping: 7, gear: 4}\n"), std::string::npos) << two;
+  EXPECT_EQ(with({{"drives"}, {"joint", "a"}}, "gear", "drives: [{joint: a}, {joint: b}]\n"),
+            "drives: [{joint: a, gear: 7}, {joint: b}]\n");
+  EXPECT_EQ(with({{"drives"}, {"joint", "it's"}}, "gear", "drives:\n  - {joint: 'it''s',\n     node: 1}\n"),
+            "drives:\n  - {joint: 'it''s',\n     gear: 7, node: 1}\n");
   const std::string three = with({{"drives"}, {"joint", "three"}, {"simulation"}}, "friction");
   EXPECT_NE(three.find("    simulation: {friction: 7}\n"), std::string::npos) << three;
 }
@@ -63,6 +68,13 @@ TEST(YamlInsertion, ChangesNothingWhereThereIsNoSuchMapOrItHasTheKey) {
   EXPECT_EQ(with({{"drives"}, {"joint", "one"}}, "gear"), "nothing");
   EXPECT_EQ(with({{"drives"}, {"joint", "one"}}, "range"), "nothing");
   EXPECT_EQ(with({{"tool"}}, "gear", "tool:\n  parts:\n    - 1\n"), "nothing") << "no line to come behind";
+}
+
+TEST(YamlInsertion, SaysWhatIsThere) {
+  EXPECT_TRUE(has_key(cell, {{"drives"}, {"joint", "one"}}, "gear"));
+  EXPECT_TRUE(has_key(cell, {{"drives"}, {"joint", "one"}, {"simulation"}}, "friction"));
+  EXPECT_FALSE(has_key(cell, {{"drives"}, {"joint", "two"}}, "simulation"));
+  EXPECT_FALSE(has_key(cell, {{"nowhere"}}, "gear"));
 }
 
 }  // namespace
