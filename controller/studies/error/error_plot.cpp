@@ -280,8 +280,7 @@ struct Glance {
 };
 
 Glance empty_glance(const RunsByCase& all) {
-  Glance glance{.error = {.title = "Position error at 1 ms; dotted: the most of order 2, and of " +
-                                   short_title(best_penalty(all)) + ", the least of the penalty methods'",
+  Glance glance{.error = {.title = "Position error with steps of 1 ms",
                           .y_label = "rms error (m)",
                           .log_y = true,
                           .y_low = bottom_m,
@@ -340,7 +339,12 @@ Chart at_a_glance(const RunsByCase& all) {
     const double error = drawn_error(worst.error_m);
     glance.error.levels.push_back({error, micrometres(worst.error_m)});
   }
-  return {.title = glance_answer(all), .panel_height = 270, .panels = {glance.error, glance.time}, .key = true};
+  return {.title = glance_answer(all),
+          .subtitle = "Each method tuned to the motion. Dotted: the largest error of order 2, and of " +
+                      short_title(best_penalty(all)) + ", the best penalty method",
+          .panel_height = 270,
+          .panels = {glance.error, glance.time},
+          .key = true};
 }
 
 }  // namespace
