@@ -20,7 +20,7 @@ constexpr double drawn_order = 1.0, drawn_drive_s = 1.6e-3;
 struct Hold {
   double mass_kg, damping_Ns_per_m;
 };
-constexpr Hold bare{0.0, 10.0}, heavy{1.0, 20.0};
+constexpr Hold heavy{1.0, 20.0};
 
 class Points {
  public:
@@ -59,6 +59,7 @@ class Points {
 // The mass that is enough for a hand up to some stiffness, at one timestep and delay.
 struct Enough {
   double period_s = 0.0, delay_s = 0.0, mass_kg = 0.0, up_to_N_per_m = 0.0;
+  bool all = true;  // of the stiffnesses that were tried
 };
 
 Enough enough_of(const Table& table, double delay_s) {
@@ -73,17 +74,19 @@ Enough enough_of(const Table& table, double delay_s) {
     smallest_kg[points.value(row, "stiffness_N_per_m")] = points.value(row, "predicted_kg");
   }
   for (const auto& [stiffness, mass_kg] : smallest_kg) {
-    if (!(mass_kg > 0.0)) break;
+    if (!(mass_kg > 0.0)) {
+      found.all = false;
+      break;
+    }
     found.mass_kg = std::max(found.mass_kg, mass_kg);
     found.up_to_N_per_m = stiffness;
   }
   return found;
 }
 
-// Two digits, rounded up: what is enough stays so.
-std::string enough_text(double mass_kg) {
-  const double unit = std::pow(10.0, std::floor(std::log10(mass_kg)) - 1.0);
-  return number_text(unit * std::ceil(mass_kg / unit - 1e-9), 2) + " kg";
+// The stiffest hand.
+std::string limit_text(const Enough& limit) {
+  return number_text(limit.up_to_N_per_m, 3) + " N/m" + (limit.all ? " and more" : "");
 }
 
 std::string milliseconds(double s) { return number_text(1e3 * s, 2) + " ms"; }
@@ -125,20 +128,17 @@ MapChart stability_chart(const Table& table) {
                  .z_label = "mass (kg)",
                  .z_least = 1e-2,
                  .columns = 3,
+                 .panel_height = 300,
                  .x_ticks = {0.25, 0.5, 1.0, 2.0, 4.0, 8.0},
                  .y_ticks = {100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0}};
   if (points.grid("period_s").empty()) return chart;
   const std::vector<double> delays = drawn_delays(points);
   chart.columns = static_cast<int>(delays.size());
-  for (const Hold& hold : {bare, heavy}) {
-    for (const double delay : delays) chart.maps.push_back(map_of(table, points, hold, delay));
-  }
+  for (const double delay : delays) chart.maps.push_back(map_of(table, points, heavy, delay));
   for (std::size_t i = 0; i < delays.size(); ++i) {
     const Enough enough = enough_of(table, delays[i]);
     if (!(enough.mass_kg > 0.0)) continue;
-    chart.maps[delays.size() + i].notes.push_back(
-        {1e3 * enough.period_s, enough.up_to_N_per_m,
-         number_text(enough.up_to_N_per_m, 3) + " N/m, " + enough_text(enough.mass_kg), Note::Side::below});
+    chart.maps[i].notes.push_back({1e3 * enough.period_s, enough.up_to_N_per_m, limit_text(enough), Note::Side::below});
   }
   return chart;
 }
@@ -226,11 +226,10 @@ std::string stability_answer(const Table& table) {
     if (enough.mass_kg > 0.0) limits.push_back(enough);
   }
   if (limits.empty()) return "Which mass is stable";
-  const auto newtons = [](const Enough& limit) { return number_text(limit.up_to_N_per_m, 3) + " N/m"; };
-  std::string range = "up to " + newtons(limits.back());
-  if (limits.size() > 1) range = "from " + newtons(limits.front()) + " down to " + newtons(limits.back());
-  return "The longer the delay, the softer the hand must be: " + range + " at a timestep of " +
-         milliseconds(limits.back().period_s) + " (dots)";
+  std::string list;
+  for (const Enough& limit : limits) list += (list.empty() ? "" : ", ") + limit_text(limit);
+  return "The longer the delay, the softer must the hand be in which a mass is stable: up to " + list +
+         " (dots; timestep " + milliseconds(limits.back().period_s) + ")";
 }
 
 std::string agreement_answer(const Table& table) {

@@ -28,6 +28,10 @@ namespace {
 // goes across: the iteration finds it without the gap's curvature.
 constexpr double kCrossing = 0.05;
 
+// Of sine²: 100 µrad. Beyond, rounding moves the place by next to nothing, and what doesn't ask where it was before is
+// the same wherever a session goes on from.
+constexpr double kAlongEachOther = 1e-8;
+
 // Where a hollow surface bends round at a point of it: across P, by 1/distance. Nothing bends of a plane.
 struct Round {
   Mat3 P = Mat3::Zero();
@@ -196,7 +200,7 @@ void RigidWorld::stay_along_side(Found& found, const ToolPose& pose) const noexc
   const Pressed* last = last_pressed(found.pair, found.which);
   if (last == nullptr) return;
   const std::optional<NearSides> sides = near_sides(found, pose);
-  if (!sides) return;
+  if (!sides || sides->sine2 > kAlongEachOther) return;
   const double way = sides->u.dot(last->place_W - found.touch.point);
   if (!(std::abs(way) * sides->sine2 <= rounding_m(pose))) return;
   const Vec3 on_axis = found.touch.point + sides->own_radius * found.touch.normal + way * sides->u;

@@ -28,13 +28,15 @@ TEST_F(StabilityAnswer, SaysUpToWhichStiffnessAndFromWhichOnNoMassIsStable) {
   add(1.2e-3, 1357.2, -1.0, -1.0);
   add(8e-3, 100.0, 5.0, 5.0);  // not asked about
   EXPECT_EQ(stability_answer(table),
-            "The longer the delay, the softer the hand must be: up to 879 N/m at a timestep of 1.2 ms (dots)");
+            "The longer the delay, the softer must the hand be in which a mass is stable: up to 879 N/m (dots; "
+            "timestep 1.2 ms)");
 }
 
 TEST_F(StabilityAnswer, SaysWhereAllStiffnessesHaveAStableMass) {
   add(1e-3, 100.0, 0.5, 0.5);
   EXPECT_EQ(stability_answer(table),
-            "The longer the delay, the softer the hand must be: up to 100 N/m at a timestep of 1 ms (dots)");
+            "The longer the delay, the softer must the hand be in which a mass is stable: up to 100 N/m and more "
+            "(dots; timestep 1 ms)");
 }
 
 TEST_F(StabilityAnswer, ClaimsNothingWhereNoMassIsStableOrNothingWasMeasured) {
