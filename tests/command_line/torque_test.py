@@ -56,7 +56,7 @@ class Torque(ProgramTest):
         text = CELL.read_text()
         ranges = [tuple(map(float, found)) for found in re.findall(r"range_rad: \[([-\d.]+), ([-\d.]+)\]", text)]
         self.assertEqual(ranges, list(hunt.RANGE_RAD))
-        self.assertEqual(set(re.findall(r"\n    max_torque_Nm: (\d+)", text)), {"18"})
+        self.assertEqual(set(re.findall(r"s2: \d+, max_torque_Nm: (\d+)", text)), {"18"})
         self.assertNotIn("max_tool_speed_m_per_s", text)  # so it is the default, 0.5
         _, record = self.led(hand(0.5, 500, 10, [(0.5, (0, 0, 0)), (1.5, (0.1, 0.1, 0.05))]), 2)
         device = hunt.Device()
