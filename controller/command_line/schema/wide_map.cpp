@@ -109,8 +109,8 @@ void share_keys(MapModel& root, const Specimens& specimens) {
     lists.back().second.push_back(key.name);
   }
   for (const auto& [list, sharing] : lists) {
-    const auto key =
-        std::find_if(root.keys.begin(), root.keys.end(), [&](const KeyModel& k) { return k.name == list; });
+    const auto key = std::find_if(root.keys.begin(), root.keys.end(),
+                                  [&named = list](const KeyModel& k) { return k.name == named; });
     widen_list(*key, sharing);
   }
 }
