@@ -125,8 +125,9 @@ struct MapLayout {
         frames_end(page_top + static_cast<double>(rows) * (map_above + chart.panel_height) +
                    static_cast<double>(rows - 1) * map_between) {}
   [[nodiscard]] Frame frame(const MapChart& chart, std::size_t i) const {
+    const std::size_t row = i / columns;
     const double left = map_left + static_cast<double>(i % columns) * width;
-    const double upper = top + static_cast<double>(i / columns) * (map_above + chart.panel_height + map_between);
+    const double upper = top + static_cast<double>(row) * (map_above + chart.panel_height + map_between);
     return {left, upper, left + width - map_right, upper + chart.panel_height};
   }
 };
