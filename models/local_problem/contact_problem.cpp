@@ -46,9 +46,12 @@ constexpr double kNoisyTolerance = 1e-10;
 constexpr int kQuiet = 18;
 constexpr double kRough = 1e-7;  // before the forces are balanced
 constexpr int kAttempts = 6;     // of Gauss and Seidel's, each with twice the sweeps of the one before
-// Of so few contacts all combinations of states are tried before Gauss and Seidel's sweeps are.
+// Of so few contacts all combinations of states are tried before Gauss and Seidel's sweeps are: with so many steps
+// each, and only as long as each leaves less than this share of what the law was missed by before it.
 constexpr std::size_t kFew = 3;
+constexpr int kQuickSteps = 8;
 constexpr double kStays = 0.7;
+// The share of what the gap that is missed most takes to be held (make_rows()).
 constexpr double kMissed = 0.1;
 // Where friction is raised from nothing: steps of Newton's at each share of it, and the least by which it is raised.
 constexpr int kRaised = 8;
@@ -347,7 +350,6 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
   }
   for (int attempt = 0; attempt < kAttempts && !solved && !exhausted(); ++attempt) {
     if (attempt == 0) {
-      y = start;
       for (Row& row : rows) row.f.setZero();
     }
     if (attempt == 1 && !slippery) {  // most are solved by the first sweeps, for less
@@ -427,7 +429,7 @@ bool ContactProblem::newton_with_states(Rows rows, Twist& y, double size, Twist 
   y = start;
   for (Row& row : rows) row.f.setZero();
   look(rows, y);
-  return held_newton(rows, y, size, quick ? 8 : 30, quick);
+  return held_newton(rows, y, size, quick ? kQuickSteps : 30, quick);
 }
 
 bool ContactProblem::enumerate(Rows rows, Twist& y, double size, int* different) noexcept {

@@ -57,11 +57,6 @@ class BesideCylinder {
   [[nodiscard]] bool sticks_out(std::uint32_t edge) const noexcept {
     return mesh_ == nullptr || mesh_->edge(edge).ridge == (held_ > 0.0);
   }
-  // Of a solid.
-  [[nodiscard]] bool is_outside(const Vec3& p) const noexcept {
-    return std::any_of(solid_->faces.begin(), solid_->faces.end(),
-                       [&](const Solid::Face& face) { return face.normal.dot(p) - face.offset > kGap_m; });
-  }
   // Of a solid: how high the lowest place of a rim is over its faces but one, at most.
   [[nodiscard]] double highest_over_others(const Solid::Rim& rim, std::uint32_t face) const noexcept {
     double most = -std::numeric_limits<double>::infinity();

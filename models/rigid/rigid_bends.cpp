@@ -149,19 +149,15 @@ std::optional<RigidWorld::NearSides> RigidWorld::near_sides(const Found& found, 
   const Pair& pair = pairs_[found.pair];
   const std::optional<Cylinder>&own = shared_->parts[pair.part].cylinder,
         &other = shared_->entries[pair.entry].cylinder;
-  const RigidObject& object = shared_->entries[pair.entry].object;
-  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
   const auto along = [](const EdgeLine& edge) { return Vec3((edge.to - edge.from).normalized()); };
   NearSides sides;
-  sides.u = pose.orientation * (own ? own->axis : along(edge_of(shared_->parts[pair.part].solid, pair.own)));
-  sides.v = other             ? other->axis
-            : mesh != nullptr ? along((*mesh)->edge(pair.other).line)
-                              : along(edge_of(*std::get_if<Solid>(&object.shape), pair.other));
+  sides.u = pose.orientation * (own ? own->axis : along(own_edge(pair)));
+  sides.v = other ? other->axis : along(other_edge(pair));
   if (moves(pair.entry)) sides.v = moving(pair.entry).mover.at().R * sides.v;
   sides.own_radius = own ? own->radius : shared_->parts[pair.part].solid.radius;
   sides.D = found.touch.gap + sides.own_radius;
   if (other) sides.D += other->radius;
-  if (const auto* solid = std::get_if<Solid>(&object.shape)) sides.D += solid->radius;
+  if (const auto* solid = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape)) sides.D += solid->radius;
   sides.sine2 = sides.u.cross(sides.v).squaredNorm();
   if (!(sides.sine2 > 1e-14 && sides.D > 0.0)) return {};
   const Vec3& n = found.touch.normal;

@@ -64,15 +64,13 @@ double RigidWorld::sine_of_rims(const Found& found, const ToolPose& pose) const 
   const Vec3& n = found.touch.normal;
   const std::optional<Cylinder>&own = shared_->parts[pair.part].cylinder,
         &other = shared_->entries[pair.entry].cylinder;
-  const auto along_edge = [&] {
-    const EdgeLine edge = beside_cylinder(pair.part, pair.entry).edge(own ? pair.other : pair.own);
-    return Vec3(edge.to - edge.from);
-  };
+  const auto along = [](const EdgeLine& edge) { return Vec3(edge.to - edge.from); };
   const auto in_W = [&](const Vec3& of_object) {
     return moves(pair.entry) ? Vec3(moving(pair.entry).mover.at().R * of_object) : of_object;
   };
-  const Vec3 along_own = own ? Vec3((pose.orientation * own->axis).cross(n)) : Vec3(pose.orientation * along_edge());
-  const Vec3 along_other = other ? Vec3(in_W(other->axis).cross(n)) : in_W(along_edge());
+  const Vec3 along_own =
+      own ? Vec3((pose.orientation * own->axis).cross(n)) : Vec3(pose.orientation * along(own_edge(pair)));
+  const Vec3 along_other = other ? Vec3(in_W(other->axis).cross(n)) : in_W(along(other_edge(pair)));
   const double lengths = along_own.norm() * along_other.norm();
   return lengths > kAlong ? std::max(along_own.cross(along_other).norm() / lengths, kAlong) : kAlong;
 }

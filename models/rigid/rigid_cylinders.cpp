@@ -227,7 +227,8 @@ bool RigidWorld::was_behind(const Pair& pair, const AtCylinder& here, const Vec3
 // of its faces: it came around an edge.
 bool RigidWorld::came_around(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept {
   const BesideCylinder::Face face = here.body.face(here.feature);
-  return face.normal.dot(here.elsewhere(place, from_of(pair))) - face.offset < -kFront_m && here.body.is_outside(place);
+  return face.normal.dot(here.elsewhere(place, from_of(pair))) - face.offset < -kFront_m &&
+         is_outside(*here.body.solid(), place);
 }
 
 // An edge far behind the rim, as one on the body's other side.

@@ -37,6 +37,16 @@ void RigidWorld::remember_lowest(Pair& pair, const View& at) const noexcept {
   if (!lowest.isZero(0.0)) pair.level = {lowest.x(), lowest.y()};
 }
 
+EdgeLine RigidWorld::own_edge(const Pair& pair) const noexcept {
+  return edge_of(shared_->parts[pair.part].solid, pair.own);
+}
+
+EdgeLine RigidWorld::other_edge(const Pair& pair) const noexcept {
+  const RigidObject& object = shared_->entries[pair.entry].object;
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
+  return mesh != nullptr ? (*mesh)->edge(pair.other).line : edge_of(*std::get_if<Solid>(&object.shape), pair.other);
+}
+
 template <typename Each>
 void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) noexcept {
   const Solid& own = shared_->parts[pair.part].solid;
@@ -61,10 +71,6 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) noexcept 
   const double lift = mesh != nullptr ? kLift_m : 0.0, other_radius = solid != nullptr ? solid->radius : 0.0;
   const double radii = own.radius + other_radius;
   const auto other_point = [&] { return mesh != nullptr ? (*mesh)->vertex(pair.other) : solid->points[pair.other]; };
-  const auto other_edge = [&] {
-    return mesh != nullptr ? (*mesh)->edge(pair.other).line : edge_of(*solid, pair.other);
-  };
-  const auto own_edge = [&] { return moved_edge(edge_of(own, pair.own), at); };
   const double side = static_cast<double>(pair.side);
   switch (pair.kind) {
     case Kind::point_face: {
@@ -98,10 +104,10 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) noexcept 
       return emit(Touch{at * foot, -(at.R * face.normal), t->gap}, lift);
     }
     case Kind::round_edges:
-      return emit(touch_edges_round(own_edge(), other_edge(), radii, own.radius), lift);
+      return emit(touch_edges_round(moved_edge(own_edge(pair), at), other_edge(pair), radii, own.radius), lift);
     case Kind::edges: {
-      EdgeLine other = other_edge();
-      const EdgeLine edge = own_edge();
+      EdgeLine other = other_edge(pair);
+      const EdgeLine edge = moved_edge(own_edge(pair), at);
       if (side == 0.0) return;
       if (mesh != nullptr && !other.open && !(*mesh)->edge(pair.other).ridge) {
         other.left = -other.left;
@@ -117,9 +123,9 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) noexcept 
       return emit(t, lift);
     }
     case Kind::point_edge:
-      return emit(touch_round(at * own.points[pair.own], other_edge(), radii, own.radius, false), lift);
+      return emit(touch_round(at * own.points[pair.own], other_edge(pair), radii, own.radius, false), lift);
     case Kind::edge_point:
-      return emit(touch_round(other_point(), own_edge(), radii, own.radius, true), lift);
+      return emit(touch_round(other_point(), moved_edge(own_edge(pair), at), radii, own.radius, true), lift);
     case Kind::point_field:
     case Kind::rim_field:
       return;
@@ -193,10 +199,8 @@ bool RigidWorld::is_beyond_edge(const Pair& pair, double gap, const View& at) co
   if (solid == nullptr || !(signed_start(pair, from_of(pair)) < -kFront_m)) return false;
   const Vec3 y = !of_tool ? at * part.solid.points[pair.own]
                           : at.to_T(mesh != nullptr ? (*mesh)->vertex(pair.other) : other->points[pair.other]);
-  const auto height = [&y](const Solid::Face& face) { return face.normal.dot(y) - face.offset; };
-  if (!(height(solid->faces[of_tool ? pair.own : pair.other]) < -kGap_m)) return false;
-  return std::any_of(solid->faces.begin(), solid->faces.end(),
-                     [&](const Solid::Face& face) { return height(face) > kGap_m; });
+  const Solid::Face& face = solid->faces[of_tool ? pair.own : pair.other];
+  return face.normal.dot(y) - face.offset < -kGap_m && is_outside(*solid, y);
 }
 
 void RigidWorld::find(const ToolPose& pose, double within_m) noexcept {

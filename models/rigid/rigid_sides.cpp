@@ -24,8 +24,7 @@ double RigidWorld::signed_start(const Pair& pair, const View& at) const noexcept
     const Solid::Face& face = own.faces[pair.own];
     return face.normal.dot(at.R.transpose() * (p - at.x)) - face.offset;
   }
-  const EdgeLine a = edge_of(own, pair.own);
-  const EdgeLine b = mesh != nullptr ? (*mesh)->edge(pair.other).line : edge_of(*solid, pair.other);
+  const EdgeLine a = own_edge(pair), b = other_edge(pair);
   Vec3 n = (at.R * (a.to - a.from)).cross(b.to - b.from);
   const double size = n.norm();
   if (!(size > 1e-7 * (a.to - a.from).norm() * (b.to - b.from).norm())) return 0.0;

@@ -256,6 +256,8 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] double side_of_solids_face(const Pair& pair, const View& at, double height, double far) const noexcept;
   [[nodiscard]] double side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept;
   [[nodiscard]] bool crossed(const Pair& pair, const Vec3& p) const noexcept;
+  [[nodiscard]] EdgeLine own_edge(const Pair& pair) const noexcept;    // of the tool, in T
+  [[nodiscard]] EdgeLine other_edge(const Pair& pair) const noexcept;  // of the object, in its frame
   [[nodiscard]] double signed_start(const Pair& pair, const View& at) const noexcept;
   template <typename Each>
   void evaluate(const Pair& pair, const View& at, Each each) noexcept;

@@ -1,6 +1,8 @@
 // What the sources of RigidWorld have in common.
 #pragma once
 
+#include <algorithm>
+
 #include "models/geometry/tool_pose.hpp"
 #include "models/rigid_features/rigid_object.hpp"
 
@@ -33,6 +35,12 @@ inline View view(const ToolPose& pose) noexcept { return {pose.orientation.toRot
 inline EdgeLine edge_of(const Solid& solid, std::uint32_t i) noexcept {
   const Solid::Edge& e = solid.edges[i];
   return {solid.points[e.from], solid.points[e.to], e.left, e.right, false};
+}
+
+// Whether a point is before a face of a convex solid without a radius.
+inline bool is_outside(const Solid& solid, const Vec3& p) noexcept {
+  return std::any_of(solid.faces.begin(), solid.faces.end(),
+                     [&](const Solid::Face& face) { return face.normal.dot(p) - face.offset > kGap_m; });
 }
 
 inline EdgeLine moved_edge(const EdgeLine& edge, const View& at) noexcept {

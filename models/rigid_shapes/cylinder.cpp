@@ -137,8 +137,8 @@ std::optional<Meeting> meet_side(const Cylinder& cylinder, const EdgeLine& edge,
   const double along = w.cross(d).dot(n) / nn, s = w.cross(cylinder.axis).dot(n) / nn;
   if (along < -beside || along > cylinder.length + beside) return {};
   if (s < -beside / length || s > 1.0 + beside / length) return {};
-  const std::optional<double> gives_way = gives_way_to_ends_m({cylinder.from, cylinder.axis, cylinder.length}, edge,
-                                                              cylinder.radius + radius, nn / (length * length));
+  const std::optional<double> gives_way =
+      gives_way_to_ends_m(axis_of(cylinder), edge, cylinder.radius + radius, nn / (length * length));
   if (!gives_way) return {};
   std::optional<Meeting> meeting =
       meet_side(cylinder, edge.from + s * d, radius, std::numeric_limits<double>::infinity());

@@ -148,11 +148,13 @@ std::optional<Touch> touch_round(const Vec3& p, const EdgeLine& edge, double rad
   return t;
 }
 
-std::optional<double> gives_way_to_ends_m(const Straight& one, const EdgeLine& other, double radii,
+std::optional<double> gives_way_to_ends_m(const EdgeLine& one, const EdgeLine& other, double radii,
                                           double sine2) noexcept {
   if (sine2 > kMaySag) return 0.0;
-  const double from = one.along.dot(other.from - one.from), to = one.along.dot(other.to - one.from);
-  const double both = std::min(std::max(from, to), one.length) - std::max(std::min(from, to), 0.0);
+  const double length = (one.to - one.from).norm();
+  const Vec3 along = (one.to - one.from) / length;
+  const double from = along.dot(other.from - one.from), to = along.dot(other.to - one.from);
+  const double both = std::min(std::max(from, to), length) - std::max(std::min(from, to), 0.0);
   const double sag = both > 0.0 ? sine2 * both * both / (8.0 * radii) : 0.0;
   if (sag <= kSag_m) return {};
   return kSag_m * std::max(0.0, (kSagFades - sag / kSag_m) / (kSagFades - 1.0));
@@ -162,20 +164,13 @@ std::optional<Touch> touch_edges_round(const EdgeLine& own, const EdgeLine& othe
                                        double own_radius) noexcept {
   const std::optional<Crossing> x = cross(own, other, beside_m);
   if (!x) return {};
-  const double length2 = (own.to - own.from).squaredNorm();
-  const double sine2 = x->across.squaredNorm() / (length2 * (other.to - other.from).squaredNorm());
-  double gives_way = 0.0;
-  if (sine2 <= kMaySag) {
-    const double length = std::sqrt(length2);
-    const std::optional<double> more =
-        gives_way_to_ends_m({own.from, (own.to - own.from) / length, length}, other, radii, sine2);
-    if (!more) return {};
-    gives_way = *more;
-  }
+  const double lengths2 = (own.to - own.from).squaredNorm() * (other.to - other.from).squaredNorm();
+  const std::optional<double> gives_way = gives_way_to_ends_m(own, other, radii, x->across.squaredNorm() / lengths2);
+  if (!gives_way) return {};
   std::optional<Touch> t = touch_point(x->own, x->other, radii);
   if (!t) return {};
   t->point -= own_radius * t->normal;
-  t->gap += gives_way;
+  t->gap += *gives_way;
   return t;
 }
 

@@ -82,14 +82,10 @@ std::optional<Touch> touch_point(const Vec3& own, const Vec3& other, double radi
 // None if the nearest point of the edge is one of its ends. `own_is_edge`: the tool's feature is the edge.
 std::optional<Touch> touch_round(const Vec3& p, const EdgeLine& edge, double radii, double own_radius,
                                  bool own_is_edge) noexcept;
-struct Straight {                                   // a segment
-  Vec3 from = Vec3::Zero(), along = Vec3::UnitX();  // unit
-  double length = 0.0;
-};
 // Round bodies that nearly lie along each other come nearer where they cross than at the ends of where both are, by a
 // sag of sine² both²/8r. None where that is next to nothing: the place is anywhere then, and the ends hold. Near that,
 // what is added to the gap at the crossing, so that it gives way to the ends by degrees.
-std::optional<double> gives_way_to_ends_m(const Straight& one, const EdgeLine& other, double radii,
+std::optional<double> gives_way_to_ends_m(const EdgeLine& one, const EdgeLine& other, double radii,
                                           double sine2) noexcept;
 // Two edges, of the tool and of the object. None if they are parallel or don't cross.
 std::optional<Touch> touch_edges_round(const EdgeLine& own, const EdgeLine& other, double radii,
