@@ -14,13 +14,12 @@ namespace {
 // What the plots ask about: 10 % at the timestep of most sessions.
 constexpr double asked_limit = 0.1, drawn_period_s = 1e-3;
 
-// A setup that is drawn: its errors by frequency, of the direction in which each is largest, and the rows of these.
+// A setup that is drawn: its errors by frequency, of the direction in which each is largest.
 struct Drawn {
   std::string name{};  // in the key
   double mass = 0.0;   // or inertia
   bool looks_ahead = false, torque = false;
   std::map<double, double> error_of_Hz{};
-  std::map<double, std::size_t> rows{};
 };
 
 bool flag(const Table& table, std::size_t row, const char* name) {
@@ -57,9 +56,7 @@ std::vector<Drawn> usual_setups(const Table& table, Way way) {
     if (at == list.end()) at = list.insert(at, wanted);
     const double f = table.number(row, frequency), e = table.number(row, error);
     const auto [found, is_new] = at->error_of_Hz.emplace(f, e);
-    if (!is_new && !(e > found->second)) continue;
-    found->second = e;
-    at->rows[f] = row;
+    if (!is_new) found->second = std::max(found->second, e);
   }
   std::ranges::sort(list, {}, [](const Drawn& d) { return std::tuple(d.mass, d.looks_ahead, d.torque); });
   for (Drawn& drawn : list) {
@@ -84,47 +81,34 @@ std::vector<Drawn> one_mass(const Table& table) {
 
 std::string timestep_text() { return "At T = " + number_text(1e3 * drawn_period_s, 3) + " ms "; }
 
-template <typename Value>
-std::vector<Curve> curves_of(const std::vector<Drawn>& setups, int first_style, Value value) {
-  std::vector<Curve> curves;
-  for (const Drawn& drawn : setups) {
-    Curve curve{.name = drawn.name, .style = first_style++, .marks = true};
-    for (const auto& [f, row] : drawn.rows) {
-      curve.x.push_back(f);
-      curve.y.push_back(value(row));
-    }
-    curves.push_back(curve);
-  }
-  return curves;
-}
-
-Panel empty_panel(const std::string& title, const std::string& y_label, double low, double high, bool log) {
-  return {.title = title,
-          .x_label = "frequency (Hz)",
-          .y_label = y_label,
-          .log_x = true,
-          .log_y = log,
-          .x_low = 0.08,
-          .x_high = 40.0,
-          .y_low = low,
-          .y_high = high,
-          .x_ticks = {0.1, 1.0, 10.0}};
-}
-
 // That which feels right within the least band.
 const Drawn& least_of(const std::vector<Drawn>& setups) {
   return *std::ranges::min_element(setups, {},
                                    [](const Drawn& drawn) { return band_Hz(drawn.error_of_Hz, asked_limit); });
 }
 
-// The error in per cent, with the limits, and a ring where 10 % are passed: of each setup, or of the first inertia.
-Panel error_panel(const Table& table, const std::vector<Drawn>& setups, bool turning) {
-  Panel panel = empty_panel(std::string("Error of the ") + (turning ? "inertia" : "mass") + " felt, " +
-                                (turning ? "about the worst axis" : "in the worst direction"),
-                            turning ? "|τ/α − J|/J (%)" : "|F/a − M|/M (%)", 0.05, 1000.0, true);
-  panel.x_ticks = {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0};
-  const std::size_t error = table.column(turning ? "inertia_error" : "mass_error");
-  panel.curves = curves_of(setups, 0, [&](std::size_t row) { return 100.0 * table.number(row, error); });
+// The error in per cent, with the limits, and a ring where 10 % are passed: of each setup, or of the inertia that does
+// so first.
+Panel error_panel(const std::vector<Drawn>& setups, bool turning) {
+  Panel panel{.title = std::string("Error of the ") + (turning ? "inertia" : "mass") + " felt, " +
+                       (turning ? "about the worst axis" : "in the worst direction"),
+              .x_label = "frequency (Hz)",
+              .y_label = turning ? "|τ/α − J|/J (%)" : "|F/a − M|/M (%)",
+              .log_x = true,
+              .log_y = true,
+              .x_low = 0.08,
+              .x_high = 40.0,
+              .y_low = 0.05,
+              .y_high = 1000.0,
+              .x_ticks = {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0}};
+  for (const Drawn& drawn : setups) {
+    Curve curve{.name = drawn.name, .style = static_cast<int>(panel.curves.size()), .marks = true};
+    for (const auto& [f, error] : drawn.error_of_Hz) {
+      curve.x.push_back(f);
+      curve.y.push_back(100.0 * error);
+    }
+    panel.curves.push_back(curve);
+  }
   for (const double limit : fidelity_limits) panel.levels.push_back({100.0 * limit, percent_text(limit)});
   double last = 0.0;
   for (const Drawn& drawn : setups) {
@@ -178,10 +162,10 @@ std::vector<std::string> draw_fidelity(const Table& table, const std::filesystem
   turning.title = fidelity_turning_answer(table);
   turning.subtitle = "Default cell, simulated; a tool that the hand turns about x, y and z";
   if (const std::vector<Drawn> setups = one_mass(table); !setups.empty()) {
-    place.panels = {error_panel(table, setups, false)};
+    place.panels = {error_panel(setups, false)};
   }
   if (const std::vector<Drawn> setups = usual_setups(table, Way::turning); !setups.empty()) {
-    turning.panels = {error_panel(table, setups, true)};
+    turning.panels = {error_panel(setups, true)};
   }
   std::vector<std::string> warnings;
   for (const auto& [chart, file] : {std::pair{&place, "fidelity.svg"}, std::pair{&turning, "fidelity_turning.svg"}}) {

@@ -16,11 +16,8 @@ namespace {
 // What is drawn of the map: (26) with drives of 100 Hz.
 constexpr double drawn_order = 1.0, drawn_drive_s = 1.6e-3;
 
-// How a handle is held.
-struct Hold {
-  double mass_kg, damping_Ns_per_m;
-};
-constexpr Hold heavy{1.0, 20.0};
+// How the handle is held that is drawn.
+constexpr double hand_kg = 1.0, hand_Ns_per_m = 20.0;
 
 class Points {
  public:
@@ -35,9 +32,9 @@ class Points {
   [[nodiscard]] double value(std::size_t row, const char* name) const {
     return table_.number(row, table_.column(name));
   }
-  [[nodiscard]] bool is_drawn(std::size_t row, const Hold& hold, double delay_s) const {
-    return is_drawn(row) && table_.number(row, delay_) == delay_s && table_.number(row, mass_) == hold.mass_kg &&
-           table_.number(row, damping_) == hold.damping_Ns_per_m;
+  [[nodiscard]] bool is_drawn(std::size_t row, double delay_s) const {
+    return is_drawn(row) && table_.number(row, delay_) == delay_s && table_.number(row, mass_) == hand_kg &&
+           table_.number(row, damping_) == hand_Ns_per_m;
   }
   [[nodiscard]] bool is_drawn(std::size_t row) const {
     return table_.number(row, order_) == drawn_order && table_.number(row, drive_) == drawn_drive_s;
@@ -70,7 +67,7 @@ Enough enough_of(const Table& table, double delay_s) {
   }
   std::map<double, double> smallest_kg;  // by the hand's stiffness; below 0: there is none
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (!points.is_drawn(row, heavy, found.delay_s) || points.value(row, "period_s") != found.period_s) continue;
+    if (!points.is_drawn(row, found.delay_s) || points.value(row, "period_s") != found.period_s) continue;
     smallest_kg[points.value(row, "stiffness_N_per_m")] = points.value(row, "predicted_kg");
   }
   for (const auto& [stiffness, mass_kg] : smallest_kg) {
@@ -93,15 +90,15 @@ std::string milliseconds(double s) { return number_text(1e3 * s, 2) + " ms"; }
 
 std::string delay_text(double delay_s) { return delay_s > 0.0 ? "T + " + milliseconds(delay_s) : "T alone"; }
 
-// At most three delays of the heavy hand, the shortest and the longest among them.
+// At most three delays, the shortest and the longest among them.
 std::vector<double> drawn_delays(const Points& points) {
   const std::vector<double> all = points.grid("delay_s");
   if (all.size() <= 3) return all;
   return {all.front(), all[all.size() / 2], all.back()};
 }
 
-Map map_of(const Table& table, const Points& points, const Hold& hold, double delay_s) {
-  Map map{.title = {"hand " + number_text(hold.mass_kg, 2) + " kg, " + number_text(hold.damping_Ns_per_m, 2) + " Ns/m",
+Map map_of(const Table& table, const Points& points, double delay_s) {
+  Map map{.title = {"hand " + number_text(hand_kg, 2) + " kg, " + number_text(hand_Ns_per_m, 2) + " Ns/m",
                     "delay " + delay_text(delay_s)},
           .x_label = "timestep T (ms)",
           .y_label = "hand's stiffness (N/m)"};
@@ -110,7 +107,7 @@ Map map_of(const Table& table, const Points& points, const Hold& hold, double de
   map.y = points.grid("stiffness_N_per_m");
   map.z.assign(map.x.size() * map.y.size(), std::numeric_limits<double>::quiet_NaN());
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (!points.is_drawn(row, hold, delay_s) || !(points.value(row, "predicted_kg") > 0.0)) continue;
+    if (!points.is_drawn(row, delay_s) || !(points.value(row, "predicted_kg") > 0.0)) continue;
     const auto x = std::ranges::find(periods, points.value(row, "period_s")) - periods.begin();
     const auto y = std::ranges::find(map.y, points.value(row, "stiffness_N_per_m")) - map.y.begin();
     map.z[static_cast<std::size_t>(y) * map.x.size() + static_cast<std::size_t>(x)] = points.value(row, "measured_kg");
@@ -134,11 +131,13 @@ MapChart stability_chart(const Table& table) {
   if (points.grid("period_s").empty()) return chart;
   const std::vector<double> delays = drawn_delays(points);
   chart.columns = static_cast<int>(delays.size());
-  for (const double delay : delays) chart.maps.push_back(map_of(table, points, heavy, delay));
-  for (std::size_t i = 0; i < delays.size(); ++i) {
-    const Enough enough = enough_of(table, delays[i]);
-    if (!(enough.mass_kg > 0.0)) continue;
-    chart.maps[i].notes.push_back({1e3 * enough.period_s, enough.up_to_N_per_m, limit_text(enough), Note::Side::below});
+  for (const double delay : delays) {
+    Map map = map_of(table, points, delay);
+    const Enough enough = enough_of(table, delay);
+    if (enough.mass_kg > 0.0) {
+      map.notes.push_back({1e3 * enough.period_s, enough.up_to_N_per_m, limit_text(enough), Note::Side::below});
+    }
+    chart.maps.push_back(map);
   }
   return chart;
 }

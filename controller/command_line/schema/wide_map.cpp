@@ -57,8 +57,9 @@ MapModel wide(const MapModel& map) {
   return all;
 }
 
-const KeyModel& key_of(const MapModel& map, const std::string& name) {
-  const auto found = std::find_if(map.keys.begin(), map.keys.end(), [&](const KeyModel& k) { return k.name == name; });
+// A map's key, of a map that may be changed or not.
+auto& key_of(auto& map, const std::string& name) {
+  const auto found = std::ranges::find(map.keys, name, &KeyModel::name);
   if (found != map.keys.end()) return *found;
   throw description::SetupError({.key = map.path + "." + name, .message = "the specimens don't have this key"});
 }
@@ -108,11 +109,7 @@ void share_keys(MapModel& root, const Specimens& specimens) {
     if (lists.empty() || lists.back().first != list) lists.push_back({list, {}});
     lists.back().second.push_back(key.name);
   }
-  for (const auto& [list, sharing] : lists) {
-    const auto key = std::find_if(root.keys.begin(), root.keys.end(),
-                                  [&named = list](const KeyModel& k) { return k.name == named; });
-    widen_list(*key, sharing);
-  }
+  for (const auto& [list, sharing] : lists) widen_list(key_of(root, list), sharing);
 }
 
 }  // namespace proxarm::command_line

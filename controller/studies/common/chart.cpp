@@ -27,14 +27,8 @@ std::size_t style_of(const Curve& curve) {
 
 // Ticks at the given places, or at gnuplot's own; of many decades every other one.
 void ticks(std::ostream& gp, char axis, const std::vector<double>& places, bool many_decades) {
-  gp << "set " << axis << "tics ";
-  if (places.empty()) {
-    gp << (many_decades ? "100\n" : "auto\n");
-    return;
-  }
-  gp << "(";
-  for (std::size_t i = 0; i < places.size(); ++i) gp << (i == 0 ? "" : ", ") << places[i];
-  gp << ")\n";
+  if (!places.empty()) return set_ticks(gp, axis, places);
+  gp << "set " << axis << "tics " << (many_decades ? "100\n" : "auto\n");
 }
 
 void set_axis(std::ostream& gp, char axis, double low, double high, bool log, const std::vector<double>& places) {
@@ -130,7 +124,6 @@ void write_points(std::ostream& data, const Curve& curve) {
 
 // "with lines ls 2", as gnuplot has it.
 std::string look_of(const Curve& curve, double mark_size) {
-  if (curve.fill) return "with filledcurves x1 fc rgb " + rgb("world-bottom") + " fs solid 1.0 noborder";
   return std::string("with ") + (curve.line ? (curve.marks ? "linespoints" : "lines") : "points") + " ls " +
          std::to_string(style_of(curve)) + (curve.marks ? " ps " + std::to_string(mark_size) : "");
 }
@@ -178,9 +171,12 @@ struct Layout {
   std::size_t key_rows = 0;
 };
 
+bool has_words_above(const Panel& panel) {
+  return std::ranges::any_of(panel.x_spans, [](const Span& span) { return !span.text.empty(); });
+}
+
 double room_above(const Panel& panel) {
-  const bool words = std::ranges::any_of(panel.x_spans, [](const Span& span) { return !span.text.empty(); });
-  return 12.0 + (panel.title.empty() ? 0.0 : 26.0) + (words ? 20.0 : 0.0);
+  return 12.0 + (panel.title.empty() ? 0.0 : 26.0) + (has_words_above(panel) ? 20.0 : 0.0);
 }
 
 double room_below(const Panel& panel) {
@@ -238,11 +234,10 @@ void set_panel(std::ostream& gp, const Panel& panel) {
   set_axis(gp, 'x', panel.x_low, panel.x_high, panel.log_x, panel.x_ticks);
   set_axis(gp, 'y', panel.y_low, panel.y_high, panel.log_y, panel.y_ticks);
   if (!panel.x_names.empty()) name_places(gp, panel.x_names);
-  const bool words = std::ranges::any_of(panel.x_spans, [](const Span& span) { return !span.text.empty(); });
-  gp << "set title " << bold(panel.title) << " offset 0," << (words ? 0.6 : -0.4) << " font ',17' textcolor rgb "
-     << rgb(panel.title_colour.c_str()) << "\nset xlabel " << plain(panel.x_label) << " offset 0,0.3\nset ylabel "
-     << plain(panel.y_label) << " offset " << (panel.log_y && panel.y_low < 1e-3 ? 1.6 : 0.6)
-     << ",0\nunset arrow\nunset object\n";
+  gp << "set title " << bold(panel.title) << " offset 0," << (has_words_above(panel) ? 0.6 : -0.4)
+     << " font ',17' textcolor rgb " << rgb(panel.title_colour.c_str()) << "\nset xlabel " << plain(panel.x_label)
+     << " offset 0,0.3\nset ylabel " << plain(panel.y_label) << " offset "
+     << (panel.log_y && panel.y_low < 1e-3 ? 1.6 : 0.6) << ",0\nunset arrow\nunset object\n";
   int label = 0;
   draw_grounds(gp, panel, label);
   for (const Note& note : panel.notes) {

@@ -16,7 +16,6 @@ struct Curve {
   int style = 0;       // curves of one style look the same; any number from 0
   bool marks = false;  // a mark at each point, on top of the line
   bool line = true;
-  bool fill = false;  // shaded from the bottom up to the curve
   double mark_size = 0.9;
 };
 

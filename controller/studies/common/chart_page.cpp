@@ -98,6 +98,12 @@ std::string rgb(const char* name) {
   return "'" + controller::css(controller::on_white(controller::colour(name).light)) + "'";
 }
 
+void set_ticks(std::ostream& gp, char axis, const std::vector<double>& places) {
+  gp << "set " << axis << "tics (";
+  for (std::size_t i = 0; i < places.size(); ++i) gp << (i == 0 ? "" : ", ") << places[i];
+  gp << ")\n";
+}
+
 Page::Page(const std::string& title, const std::string& subtitle, int width)
     : width_(width),
       title_(wrapped(title, fitting(width - 40, title_size))),
@@ -112,8 +118,8 @@ void Page::begin(std::ostream& gp, double height) {
   double y = 24.0;
   int label = 1000;
   for (const std::string& line : title_) {
-    gp << "set label " << label++ << " " << bold(line) << " at screen 0.5, screen " << screen_y(y)
-       << " center font ',21' textcolor rgb " << rgb("ink") << "\n";
+    gp << "set label " << label++ << " " << bold(line) << " at screen 0.5, screen " << screen_y(y) << " center font ',"
+       << title_size << "' textcolor rgb " << rgb("ink") << "\n";
     y += title_line;
   }
   for (const std::string& line : subtitle_) {

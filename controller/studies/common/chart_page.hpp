@@ -30,6 +30,9 @@ std::size_t letters(const std::string& text);
 // "'#17202a'": a colour of the palette on white, for gnuplot's rgb.
 std::string rgb(const char* name);
 
+// Ticks at these places of an axis, 'x' or 'y'.
+void set_ticks(std::ostream& gp, char axis, const std::vector<double>& places);
+
 // A panel's frame.
 struct Frame {
   double left = 0.0, top = 0.0, right = 0.0, bottom = 0.0;

@@ -31,12 +31,6 @@ std::string palette_steps(int steps) {
   return text;
 }
 
-void set_ticks(std::ostream& gp, char axis, const std::vector<double>& places) {
-  gp << "set " << axis << "tics (";
-  for (std::size_t i = 0; i < places.size(); ++i) gp << (i == 0 ? "" : ", ") << places[i];
-  gp << ")\n";
-}
-
 // Where the cell of a grid's line ends: half way to the next, and as far beyond the last.
 double edge(const std::vector<double>& grid, std::size_t k, double side) {
   const std::size_t last = grid.size() - 1;

@@ -119,17 +119,15 @@ void mark_1_ms(const std::vector<Runs>& list, Over over, Panel& panel) {
   panel.curves.push_back(curve);
 }
 
-// "40 times as fast", of order 2 against the best of the others; good: whether it is faster.
-struct Verdict {
-  std::string text{};
-  bool good = false;
-};
-
-Verdict verdict_of(const std::vector<Runs>& list) {
+// How many times as fast order 2 is as the best of the others; 0: not comparable.
+double times_as_fast(const std::vector<Runs>& list) {
   const double times = speedup_over_tuned(runs_of(list, method_names[order_2]), list).median;
-  if (!(times > 0.0)) return {"not comparable", false};
-  if (times > 1.0) return {number_text(times, 2) + " × as fast", true};
-  return {number_text(1.0 / times, 2) + " × as long", false};
+  return times > 0.0 ? times : 0.0;
+}
+
+std::string verdict_text(double times) {
+  if (times == 0.0) return "not comparable";
+  return times > 1.0 ? number_text(times, 2) + " × as fast" : number_text(1.0 / times, 2) + " × as long";
 }
 
 Panel panel_of(const ErrorCase& which, const std::vector<Runs>& list, const Fixed& fixed, Over over) {
@@ -145,9 +143,9 @@ Panel panel_of(const ErrorCase& which, const std::vector<Runs>& list, const Fixe
     add_ours(runs_of(list, method_names[method]), method, over, panel);
   }
   if (over == Over::run_time) {
-    const Verdict verdict = verdict_of(list);
-    panel.title += ": " + verdict.text;
-    panel.title_colour = verdict.good ? "good" : "bad";
+    const double times = times_as_fast(list);
+    panel.title += ": " + verdict_text(times);
+    panel.title_colour = times > 1.0 ? "good" : "bad";
     panel.y_spans.push_back({1e-6, 1e-3, ""});
     panel.curves.push_back(rivals_over_run_time(list));
     if (const Runs* one = fixed_runs(list, fixed); one != nullptr) panel.curves.push_back(fixed_curve(*one, fixed));
@@ -180,6 +178,12 @@ void share_x(Chart& chart, const std::string& x_label) {
   }
 }
 
+std::string in_words(const ErrorCase& which) {
+  std::string name = which.name;
+  std::ranges::replace(name, '_', ' ');
+  return name;
+}
+
 // All motions in one panel: how many times as fast order 2 is, above the line or below it.
 Panel verdict_panel(const RunsByCase& all) {
   Panel panel{.title = "How many times as fast order 2 is as the best of the others, for the same error",
@@ -193,9 +197,8 @@ Panel verdict_panel(const RunsByCase& all) {
   for (const ErrorCase& which : error_cases()) {
     const auto found = all.find(which.name);
     if (found == all.end()) continue;
-    const double faster = speedup_over_tuned(runs_of(found->second, method_names[order_2]), found->second).median;
-    panel.x_names.push_back(which.name);
-    std::ranges::replace(panel.x_names.back(), '_', ' ');
+    const double faster = times_as_fast(found->second);
+    panel.x_names.push_back(in_words(which));
     if (!(faster > 0.0)) continue;
     const auto x = static_cast<double>(panel.x_names.size() - 1);
     times.x.push_back(x);
@@ -217,10 +220,9 @@ Chart case_panels(const RunsByCase& all, Over over) {
   return chart;
 }
 
-// Of a method over all motions with steps of 1 ms: where it errs most, and what its steps take.
+// Of a method over all motions with steps of 1 ms: what it errs by at most, and what its steps take.
 struct Worst {
   double error_m = 0.0, least_ns = std::numeric_limits<double>::infinity(), most_ns = 0.0;
-  std::string motion{};
 };
 
 Worst worst_of(const RunsByCase& all, Method method) {
@@ -229,10 +231,7 @@ Worst worst_of(const RunsByCase& all, Method method) {
     const AtOneMs at = best_at_1_ms(list, method_names[method]);
     worst.least_ns = std::min(worst.least_ns, at.step_ns);
     worst.most_ns = std::max(worst.most_ns, at.step_ns);
-    if (at.error_m > worst.error_m) {
-      worst.error_m = at.error_m;
-      worst.motion = name;
-    }
+    worst.error_m = std::max(worst.error_m, at.error_m);
   }
   return worst;
 }
@@ -299,8 +298,7 @@ Glance empty_glance(const RunsByCase& all) {
     const auto x = static_cast<double>(place);
     if (place % 2 == 1) glance.error.x_spans.push_back({x - 0.5, x + 0.5, ""});
     glance.places[which.name] = place;
-    glance.error.x_names.push_back(which.name);
-    std::ranges::replace(glance.error.x_names.back(), '_', ' ');
+    glance.error.x_names.push_back(in_words(which));
   }
   glance.time.x_names = glance.error.x_names;
   glance.time.x_spans = glance.error.x_spans;
@@ -334,10 +332,10 @@ Chart at_a_glance(const RunsByCase& all) {
   }
   add_method(all, order_2, glance);  // on top
   for (const Method method : {order_2, best_penalty(all)}) {
-    const Worst worst = worst_of(all, method);
-    if (!std::isfinite(worst.error_m) || !glance.places.contains(worst.motion)) continue;
-    const double error = drawn_error(worst.error_m);
-    glance.error.levels.push_back({error, micrometres(worst.error_m)});
+    const double error_m = worst_of(all, method).error_m;
+    if (error_m > 0.0 && std::isfinite(error_m)) {
+      glance.error.levels.push_back({drawn_error(error_m), micrometres(error_m)});
+    }
   }
   return {.title = glance_answer(all),
           .subtitle = "Each method tuned to the motion. Dotted: the largest error of order 2, and of " +
@@ -351,7 +349,7 @@ Chart at_a_glance(const RunsByCase& all) {
 
 std::string work_answer(const RunsByCase& all) {
   int faster = 0;
-  for (const auto& [name, list] : all) faster += verdict_of(list).good ? 1 : 0;
+  for (const auto& [name, list] : all) faster += times_as_fast(list) > 1.0 ? 1 : 0;
   return "For the same error order 2 takes less time than the best of the others, tuned to the motion, in " +
          std::to_string(faster) + " of " + std::to_string(all.size()) + " motions";
 }

@@ -50,7 +50,7 @@ TEST(Chart, TitleNotesAndKeyAreInThePicture) {
               .log_y = true,
               .curves = {{.name = "grows", .x = {0.0, 1.0, 2.0}, .y = {1.0, std::nan(""), 3.0}, .marks = true},
                          {.name = "empty"},
-                         {.x = {0.0, 2.0}, .y = {0.5, 0.5}, .fill = true}},
+                         {.x = {0.0, 2.0}, .y = {0.5, 0.5}}},
               .y_low = 0.1,
               .y_high = 10.0,
               .levels = {{2.0, "limit"}},
