@@ -122,7 +122,7 @@ bool insert(std::string& text, const std::string& joint, const std::string& key,
   return description::insert_key(text, {entry[0], entry[1], {map}}, bare(key), fresh);
 }
 
-// What all simulated drives have from simulation_defaults is this one's own from now on.
+// Overrides a key of simulation_defaults in the `simulation` of one joint's drive, unless it has that key already.
 void own_simulation(std::string& text, const std::string& joint, const std::string& key, const std::string& fresh) {
   const bool is_own = description::has_key(text, {{"drives"}, {"joint", joint}, {"simulation"}}, key);
   if (is_own || !description::has_key(text, {{"simulation_defaults"}}, key)) return;

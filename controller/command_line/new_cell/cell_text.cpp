@@ -41,7 +41,7 @@ std::string pose(const description::PoseDescription& X) {
 // Keys and what they say.
 using Keys = std::vector<std::pair<std::string, std::string>>;
 
-// What is usually the same for all drives, and for how all of them are simulated.
+// Keys that all drives usually share, and those that their `simulation` maps do.
 Keys common_keys(const description::DriveDescription& d) {
   Keys keys{{"profile", "cia402"}, {"mode", "csp"}};
   if (!d.eds.empty()) keys.emplace_back("eds", scalar(d.eds));

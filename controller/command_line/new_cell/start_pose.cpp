@@ -22,7 +22,7 @@ constexpr std::size_t tried = 2000;  // of them, whether the hand's way can be g
 constexpr double step_share = 2e-3;
 // Nearer to an axis than this the tool is at it, where turning doesn't move it.
 constexpr double at_an_axis_m = 1e-3;
-// What turns the tool on a smaller circle doesn't lead it anywhere: steps that it can follow would be thousands.
+// The least reach that steps are chosen for: on a smaller circle the hand's way would take thousands of them.
 constexpr double smallest_circle_m = 0.05;
 constexpr double another_rad = 0.3;  // m of a joint that slides: half of the way of a hand
 constexpr double least_share = 0.4;  // of the start's smallest singular value, anywhere on the way
@@ -160,7 +160,7 @@ double gone_m(const models::Arm& arm, models::InverseKinematics inverse, const J
   return std::numeric_limits<double>::infinity();
 }
 
-// Of the first straight piece of a hand's way, which is as long as it comes from its start in a straight line.
+// The length of the first straight piece of a hand's way.
 double first_piece_m(const description::HandDescription& hand) {
   for (const description::Waypoint& waypoint : hand.waypoints) {
     const double length_m = Vec3(waypoint.offset_m.data()).norm();

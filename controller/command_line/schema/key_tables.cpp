@@ -164,7 +164,7 @@ class Cases {
   std::vector<std::pair<std::string, std::vector<std::string>>> texts_;
 };
 
-// What is told of a key whose maps may have keys elsewhere is what holds where they don't.
+// The cases that a table shows: of a key whose maps may have defaults, those that hold without defaults.
 std::vector<KeyCase> told(const KeyModel& key) {
   std::vector<KeyCase> cases = key.cases;
   if (std::erase_if(cases, [](const KeyCase& one) { return one.is_wide; }) == 0) return cases;

@@ -17,7 +17,7 @@ void unite(std::vector<Word>& all, const std::vector<Word>& more) {
   }
 }
 
-// What either takes.
+// Widens `a` to all values that a or b accepts.
 void unite(Alternative& a, const Alternative& b) {
   if (b.range.min < a.range.min) a.range.above_min = b.range.above_min;
   if (b.range.min == a.range.min) a.range.above_min = a.range.above_min && b.range.above_min;

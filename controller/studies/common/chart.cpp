@@ -55,7 +55,7 @@ void name_places(std::ostream& gp, const std::vector<std::string>& names) {
   gp << ") font ',15'\nset xrange [-0.5:" << static_cast<double>(names.size()) - 0.5 << "]\n";
 }
 
-// What of a panel stands behind its curves: shaded parts and lines, with their words.
+// Draws shaded spans and straight lines behind the curves of a panel, with their texts.
 void draw_grounds(std::ostream& gp, const Panel& panel, int& label) {
   int number = 0;
   for (const Span& span : panel.x_spans) {
@@ -128,8 +128,8 @@ std::string look_of(const Curve& curve, double mark_size) {
          std::to_string(style_of(curve)) + (curve.marks ? " ps " + std::to_string(mark_size) : "");
 }
 
-// What is plotted of a panel: its curves, and the rings of its notes. Their points go to `data`, whose blocks are
-// counted.
+// gnuplot's plot entries of a panel: its curves, and rings around its notes. Appends their points to `data`, one block
+// each.
 std::vector<std::string> plots_of(const Panel& panel, std::ostream& data, std::size_t& block) {
   std::vector<std::string> plots;
   const auto add = [&](const Curve& curve, const std::string& look) {
@@ -164,7 +164,7 @@ std::vector<std::string> key_entries(const Chart& chart, std::size_t& longest) {
 
 constexpr double key_line = 24.0;
 
-// Where panels are, and the key below them.
+// The frames of all panels, and the place of the key below them.
 struct Layout {
   std::vector<Frame> frames;
   double key_top = 0.0, height = 0.0;

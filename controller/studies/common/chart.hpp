@@ -56,7 +56,7 @@ struct Panel {
 
 struct Chart {
   std::string title{};      // the answer; long ones take several lines
-  std::string subtitle{};   // of what it is the answer
+  std::string subtitle{};   // what was measured, and how
   int columns = 1;          // panels side by side
   int width = 1000;         // of all of it
   int panel_height = 300;   // of a panel's frame

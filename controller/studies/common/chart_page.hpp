@@ -1,4 +1,4 @@
-// What charts and maps share: the page with its title, and where on it panels are. Lengths in pixels from the top left.
+// The page of a chart or a map: its title, and the places of panels on it. Lengths in pixels, from the top left.
 #pragma once
 
 #include <iosfwd>
