@@ -51,7 +51,7 @@ struct HandSigns {
   bool at_handle = false;        // the force acts at the handle
   bool left_by_tare = false;     // the force is left over from a hand that pushed during the tare
   bool as_offset = false;        // the force acts at the sensor's origin
-  double unknown_N = 0.0;        // part of the force that may be weight missing in the cell file
+  double unknown_N = 0.0;        // part of the force that may be weight missing from the arm's model
   bool limited = false;          // the tool's speed limit held the proxy back in its last step
 };
 
