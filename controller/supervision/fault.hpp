@@ -2,7 +2,7 @@
 //
 // Set-up mistakes throw SetupError before anything moves; an active limit isn't a fault and has its own flags. Each
 // fault has one reaction (see the table in fault.cpp and docs/supervision.md); if that table allows, a cell may choose
-// where the row allows it. A stop latches the fault, and the run ends with exit status 1 unless it is reset.
+// another. A stop latches the fault, and the run ends with exit status 1 unless it is reset.
 #pragma once
 
 #include <array>
