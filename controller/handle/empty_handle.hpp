@@ -22,7 +22,6 @@
 //
 // While the handle is empty, a braking force −M v/τ_b of at most M a_b replaces the hand's force. The proxy treats it
 // like any other force: contacts, friction, springs and moving objects act as usual, and nothing jumps.
-// other: contacts, friction, springs and moving objects act as always, and nothing jumps.
 #pragma once
 
 #include "controller/handle/unexplained_way.hpp"
@@ -39,20 +38,19 @@ struct EmptyHandleConfig {
   bool at_once = true;        // one sample beyond the band ends it; false: that sample may be the tool's inertia
 };
 
-// The hand's force and the proxy's motion in one cycle.
 struct HandSigns {
   const models::Wrench& hand_W;  // without bias, tool weight and tool inertia
   double noise_N = 0.0;          // σ; 0: unknown
   bool noise_is_white = true;    // σ is the sensor's noise, not a hand's motion
   double tare_samples = 0.0;     // n
-  double sample_cycles = 1.0;    // cycles from one sample to the next
-  const models::Vec3& v_W;       // of the proxy, last step
-  double mass_kg = 0.0;          // of the proxy
-  bool at_handle = false;        // the force acts at the handle
-  bool left_by_tare = false;     // the force is left over from a hand that pushed during the tare
-  bool as_offset = false;        // the force acts at the sensor's origin
-  double unknown_N = 0.0;        // part of the force that may be weight missing from the arm's model
-  bool limited = false;          // the tool's speed limit held the proxy back in its last step
+  double sample_cycles = 1.0;
+  const models::Vec3& v_W;    // of the proxy, last step
+  double mass_kg = 0.0;       // of the proxy
+  bool at_handle = false;     // the force acts at the handle
+  bool left_by_tare = false;  // the force is left over from a hand that pushed during the tare
+  bool as_offset = false;     // the force acts at the sensor's origin
+  double unknown_N = 0.0;     // part of the force that may be weight missing from the arm's model
+  bool limited = false;       // the tool's speed limit held the proxy back in its last step
 };
 
 class EmptyHandle {
@@ -98,7 +96,7 @@ class EmptyHandle {
     double braking_m_per_s2 = 0.0;               // present bound on the braking; rises to a_b
     models::Vec3 bias_W = models::Vec3::Zero();  // the force that led the handle; zero: none
     bool empty = false;
-    bool led = false;  // see led()
+    bool led = false;
   };
 
   [[nodiscard]] double size_N(const models::Wrench& wrench_W) const noexcept;

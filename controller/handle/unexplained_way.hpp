@@ -11,8 +11,7 @@
 //   - A bias that drifts or has jumped: the line began at rest (v₀ ≤ 10 mm/s plus the speed that the force adds before
 //     its beginning is seen), and the force is now less than 1.5 N. It needn't have accelerated the proxy.
 //   - A larger bias that has jumped: the line began at rest and has changed by at most a fifth of its present value,
-//   and
-//     the force has accelerated the proxy by at least half as much as in free space.
+//     and the force has accelerated the proxy by at least half as much as in free space.
 //   - A bias of any size and beginning, drifting or not: the line has lasted for a second, with the same acceleration.
 //   - A force left over from a hand that pushed during the tare, or one that acts at the sensor's origin
 //     (hand_force.hpp).

@@ -6,9 +6,8 @@
 // c never jumps:
 //   - H approaches the wanted horizon by at most `horizon_rate` seconds per second. At speed v this moves c by at most
 //     that share of v.
-//   - Damping and spring act within H, so p jumps when they or the mass change. The offset o compensates: in that cycle
-//   c
-//     goes on with its last velocity, and o then fades with `fading_s`.
+//   - Damping and spring act within H, so p jumps when they or the mass change. The offset o compensates: in that
+//     cycle c goes on with its last velocity, and o then fades with `fading_s`.
 //   - c follows p as fast as the sets of its own motion allow (speed, acceleration, power, leash). While borders or
 //     joints hold c back, o is its distance from p. When they release c, it moves along with p, and o fades.
 // The proxy keeps the same limits as without lookahead. The acceleration limit applies to a commanded point behind the

@@ -9,19 +9,16 @@
 // acceleration never give way. The limited q becomes q(k−1), so nothing winds up behind a limit.
 //
 // - Speed: ‖q − q₁‖ ≤ vT, v = 0.9 limits.max_tool_speed_m_per_s. Power: v = max_power_W/‖h‖, which bounds the power
-// that
-//   the arm exchanges with the hand.
+//   that the arm exchanges with the hand.
 // - Acceleration: of the commanded point behind the setpoint filter (elastic_setpoint.hpp) with state x, v:
 //   ‖ω²(q − x) − 2ωv‖ ≤ a, a ball around x + 2v/ω. A proxy that meets a wall below a·e/ω (e = 2.718…; 0.34 m/s with the
 //   default cell) needs no more than a. Without a filter: ‖q − 2q₁ + q₂‖ ≤ aT².
 // - Border at distance d, less a setback: n·(q − q₁) ≤ d T/(T + v/a). The speed towards a border decreases with d,
-// slowly
-//   enough that braking straight along the present velocity keeps all borders at once: from u ≤ d/(T + v/a) and a
-//   deceleration of a follows (1 − aT/v)(T + v/a) ≤ v/a. The filter doesn't overshoot, so the commanded point keeps
+//   slowly enough that braking straight along the present velocity keeps all borders at once: from u ≤ d/(T + v/a) and
+//   a deceleration of a follows (1 − aT/v)(T + v/a) ≤ v/a. The filter doesn't overshoot, so the commanded point keeps
 //   convex borders, too.
 // - Keep-out box: the half-space of the face whose plane lies furthest ahead of the proxy. The commanded point lags by
 //   2v/ω (some millimetres) and may cut corners by as much, so a box must include that margin.
-//   2v/ω (some millimetres) and may cut the box's corners by that much, so boxes need that much room around them.
 #pragma once
 
 #include <algorithm>
