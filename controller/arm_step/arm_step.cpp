@@ -154,7 +154,7 @@ double ArmStep::room_rad(std::size_t i, double sign) const noexcept {
 // Accelerations bound a step that doesn't brake; ranges and speeds bound braking, too.
 void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
   const double T = period_s_;
-  double cycles = 0.0;  // that the slowest joint needs to brake
+  double cycles = 0.0;  // braking time of the slowest joint
   for (Eigen::Index i = 0; i < step_rad_.size(); ++i) {
     const double a = joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
     cycles = std::max(cycles, std::abs(step_rad_[i]) / (braking_share * a * T * T));
@@ -503,7 +503,7 @@ bool ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
   const double B = growth_m_per_s(u), T = period_s_;
   const JointVector B_u = growth_gradient(u);
   bool leaves = false;
-  // Only the joints before it move a joint's origin.
+  // A joint's origin moves only with the joints before it.
   const auto limit = [&](const Vec3& from_W, const Vec3& to_W, std::size_t joints, double most_m_per_s) {
     const Vec3 way = to_W - from_W;
     const double length = way.norm(), V = length / T, beyond = fastest_to_rest(V, B) - most_m_per_s;

@@ -11,7 +11,7 @@
 //   - c follows p as fast as the sets of its own motion allow (speed, acceleration, power, leash). While borders or
 //     joints hold c back, o is its distance from p. When they release c, it moves along with p, and o fades.
 // The proxy keeps the same limits as without lookahead. The acceleration limit applies to a commanded point behind the
-// setpoint filter, so the proxy has a filter of its own here (x, v of step_limits.hpp), as if the arm were sent to the
+// setpoint filter, so the proxy has a separate filter here (x, v of step_limits.hpp), as if the arm were sent to the
 // proxy.
 //
 // All in W. Nothing allocates, locks or throws.

@@ -260,7 +260,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   return true;
 }
 
-// Takes over the proxy's step. Returns false if it failed.
+// Takes over the proxy's step; false if it failed.
 bool AdmittanceMotion::take(const WorldStep& step, const MotionCycle& cycle) noexcept {
   if (step.fault != ProxyFault::none) {
     cycle.alarm.raise(step.fault == ProxyFault::squeezed ? Fault::proxy_squeezed : Fault::proxy_not_finite);
@@ -494,7 +494,6 @@ void AdmittanceMotion::put_proxy_where(const ArmStep& step) noexcept {
   if ((q_W - state_.q_k1_W).norm() > same_place_m) put_proxy_to(q_W, (q_W - state_.q_k2_W) / period_s_);
 }
 
-// Moves the proxy to q_W, with this velocity.
 void AdmittanceMotion::put_proxy_to(const Vec3& q_W, const Vec3& velocity_W) noexcept {
   state_.q_k1_W = tool().resume(q_W, velocity_W);
 }
@@ -552,7 +551,7 @@ void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   if (ahead_) {
     ahead_->proxy_step.resume(arm_step_.link_rad() - ahead_s() * speed, period_s_ * speed);
     ahead_->proxy_filter.resume(filter.rad() - ahead_s() * speed, speed);
-    // With constant joint speeds the tool moves along a curve. If the proxy weren't at the place of its own arm step,
+    // With constant joint speeds the tool moves along a curve. If the proxy weren't at the place of its arm step,
     // the next cycle would move it there.
     const Vec3 c_W = q_W;
     q_W = ahead_->proxy_step.kinematics().X_WT.translation();

@@ -27,7 +27,6 @@
 
 namespace proxarm::controller {
 
-// The drive of an axis, on CAN or on a Modbus line.
 struct DriveOnBus {
   static constexpr std::size_t no_bus = static_cast<std::size_t>(-1);
 

@@ -37,10 +37,9 @@ class FinalSetpoints {
     // small if it moves the tool no further than limits.following_error_rad of the joint with the longest lever.
     bool differs = false;
   };
-  // Bounds on the setpoints of one period.
   struct Bounds {
     double max_speed_m_per_s;  // the tool's present speed limit
-    models::Vec3 links_W;      // the tool's place by the link angles that the motors lead
+    models::Vec3 links_W;      // the tool's place by the links, which the motors lead
     const TurnSets* turn;      // limits of turning; null: not judged
   };
   // One period towards these motor angles.
@@ -53,13 +52,12 @@ class FinalSetpoints {
   ActiveLimits run_out() noexcept;
   [[nodiscard]] bool has_run_out() const noexcept { return state_.run_out_share <= 0.0 && guard_.at_rest(); }
 
-  // Largest step of each joint in a cycle, at its drive's maximum speed.
   [[nodiscard]] std::array<double, models::max_axes> max_steps_rad(double period_s) const noexcept {
     return controller::max_steps_rad(drives_, period_s);
   }
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return guard_.target_rad(); }
   [[nodiscard]] bool at_rest() const noexcept { return guard_.at_rest(); }
-  // Setpoints near a bound, which the tool guard judged exactly.
+  // Number of setpoints near a bound, judged exactly by the tool guard.
   [[nodiscard]] std::uint64_t judged_exactly() const noexcept { return tool_guard_.judged_exactly(); }
   void archive(fieldbus::StateArchive& state) noexcept;
 

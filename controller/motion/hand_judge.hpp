@@ -42,7 +42,6 @@ class HandJudge {
  public:
   HandJudge(const description::SupervisionDescription& supervision, const HandJudgeConfig& config, double period_s);
 
-  // `lag_s` as in HandJudgeConfig.
   void set_period(double period_s, double lag_s) noexcept;
   void set_tool(const HeldTool& tool) noexcept;
   void start() noexcept;

@@ -30,13 +30,12 @@ struct SensorBias {
   double noise_N = 0.0;
   bool noise_is_white = true;  // successive samples are independent: nobody moved the handle
   double samples = 0.0;        // number of averaged samples
-  double sample_cycles = 1.0;  // cycles from one sample to the next
-  double drift_N = 0.0;        // drift of the bias while nobody held the handle
+  double sample_cycles = 1.0;
+  double drift_N = 0.0;  // drift of the bias while nobody held the handle
   // The tare's mean less the known zero: drift, or a force on the handle during the tare. Zero if no zero is known.
   models::Vec3 beside_zero_S = models::Vec3::Zero();
 };
 
-// When drives answer.
 struct AnswerTimes {
   models::JointVector unheard_cycles;  // of each drive: cycles before this one without an answer
   models::JointVector period_s;        // of each drive's answers; 0: every cycle

@@ -27,7 +27,6 @@
 
 namespace proxarm::controller {
 
-// Inputs of a step, and where it reports.
 struct MotionCycle {
   const Measured& measured;
   bool slowed = false;  // the reaction `slow` limits the tool's speed
@@ -118,7 +117,6 @@ class Motion {
   bool made_setpoints_ = false;
 };
 
-// Records a step of the world.
 void record_world(const WorldStep& step, CycleRecord& record) noexcept;
 
 std::vector<description::DriveDescription> descriptions(const std::vector<DriveOnBus>& drives);

@@ -7,7 +7,7 @@
 
 namespace proxarm::controller {
 
-// Setpoints of a cycle in the order of the joints: motor angles or joint torques.
+// In the order of the joints: motor angles or joint torques.
 struct Setpoints {
   enum class Kind : std::uint8_t { angles_rad, torques_Nm };
   Kind kind = Kind::angles_rad;

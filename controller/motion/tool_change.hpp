@@ -16,8 +16,8 @@
 // - the remembered zero: the tare would differ from it by more than the sensor drifts, and by more than before;
 // - the present reading: the change exceeds the tare's uncertainty, brings the reading neither to half nor within that
 //   uncertainty, and doesn't halve the tare's distance from the remembered zero either.
-// A force of 0.07 N, within the band of an empty handle, may move the handle by 10 mm before it is told from a hand,
-// and further with a load. The tare's uncertainty exists with any figures.
+// The uncertainty limits this, because even 0.07 N, within the band of an empty handle, may move the handle by 10 mm
+// before it is distinguished from a hand, and further with a load.
 //
 // No allocation, lock or throw after construction.
 #pragma once
@@ -32,7 +32,6 @@
 
 namespace proxarm::controller {
 
-// The tool of a cell.
 [[nodiscard]] HeldTool held_tool(const description::ToolDescription& tool) noexcept;
 
 // The reason why the sensor's readings contradict figures of the tool.

@@ -25,7 +25,6 @@ class WrenchCompensation {
   // Weight of the tool in S, about S's origin, with the sensor at R_WS.
   [[nodiscard]] models::Wrench tool_weight_S(const models::Mat3& R_WS) const noexcept;
 
-  // Clears the average.
   void start_tare() noexcept;
   // Adds a reading at rest to the average that becomes the bias.
   void add_tare_sample(const models::Wrench& reading_S, const models::Mat3& R_WS) noexcept;
@@ -54,7 +53,6 @@ class WrenchCompensation {
   // Adds rest_S to the bias, at most most_N and most_Nm in each axis of S. Precondition: nobody holds the handle, so
   // that rest_S is bias.
   void follow_bias(const models::Wrench& rest_S, double most_N, double most_Nm) noexcept;
-  // Drift of the force's bias since the tare, in N.
   [[nodiscard]] double drift_N() const noexcept { return drift_S_.force.norm(); }
   [[nodiscard]] const models::Wrench& bias_S() const noexcept { return bias_S_; }
   // The force's bias by the tare alone, without drift.

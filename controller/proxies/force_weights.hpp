@@ -22,9 +22,8 @@
 // of the impact.
 //
 // If friction releases a proxy at rest, it does so within a step. Let a be the force left over in the first step of the
-// slide and Δ the growth of h since the last step; the release was the share θ = a/Δ of the step before t_k. For a
-// force that grows linearly from there, the sum over samples differs from its integral by T Δ(θ² − θ + 1/3)/2. The next
-// step adds this.
+// slide and Δ the growth of h since the last step; the release was at t_k − θT, θ = a/Δ. For a force that grows
+// linearly from there, the sum over samples differs from its integral by T Δ(θ² − θ + 1/3)/2. The next step adds this.
 //
 // Laws of velocity need the rate of q at the law's time. If friction turns, or a proxy is in a medium and in contact, 𝒢
 // is evaluated again from q̃ = (4q₁ − q₂)/3 with 2T/3: (q − q̃)/(2T/3) is the rate at t_{k+1}. If the proxy enters or

@@ -35,7 +35,7 @@ struct Change {
   double tool_mass_kg = 0.0;  // of the tool behind the sensor; for a mass: subtracted from the felt one; 0: none
 };
 
-using ScheduledChange = Scheduled<Change>;  // by the time spent rendering
+using ScheduledChange = Scheduled<Change>;  // times count rendering only
 
 // Another timestep, checked for this cell, with the counts of cycles that depend on it (SessionSettings).
 struct Timestep {
@@ -44,6 +44,6 @@ struct Timestep {
   double horizon_s = -1.0;  // new horizon of the lookahead; negative: unchanged
 };
 
-using ScheduledTimestep = Scheduled<Timestep>;  // by the time spent rendering
+using ScheduledTimestep = Scheduled<Timestep>;  // times count rendering only
 
 }  // namespace proxarm::controller

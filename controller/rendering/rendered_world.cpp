@@ -96,9 +96,9 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   Vec3 resume(const Vec3& q_W, const Vec3& v_W) noexcept override {
-    // One evaluation of 𝒢 goes as far as the scene allows, for any κ. From outside all objects this leads nearer to the
-    // wanted place. From inside one, where limits made the contact give way, 𝒢 moves out at once over any distance;
-    // then the wanted place is used instead.
+    // One evaluation of 𝒢 goes to the nearest place that the scene allows, for any κ. From outside all objects this
+    // leads nearer to the wanted place. From inside one, where limits made the contact give way, 𝒢 moves out at once
+    // over any distance; then the wanted place is used instead.
     const Vec<N> wanted = space_.from_W(q_W), v = space_.basis().transpose() * v_W;
     if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
     ProxyStart<N> start;

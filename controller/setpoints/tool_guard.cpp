@@ -23,7 +23,6 @@ constexpr int quick_rounds = 1, exact_rounds = 3;
 // Share of the speed limits that passes. Drives overshoot by up to 7 % when the guard acts, and the arm must stay
 // within 5 % of its limit. The quick test is stricter and leaves close cases to the exact one.
 constexpr double exact_share = 0.99, quick_share = 0.985, quick_way_m = 1e-4;
-// Rounding of positions.
 constexpr double touching_m = 1e-10;
 // Tolerances of orientations: setpoints are rounded to counts of some 1e-7 rad; a period's turning is as exact as the
 // kinematics.

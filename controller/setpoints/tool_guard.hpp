@@ -59,7 +59,7 @@ class ToolGuard {
   [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }
   // The arm's points, at rest at the last setpoint.
   [[nodiscard]] const models::ArmPoints& points() const noexcept { return points_; }
-  // Setpoints near a bound, for which the quick test didn't suffice.
+  // Number of setpoints near a bound, for which the quick test didn't suffice.
   [[nodiscard]] std::uint64_t judged_exactly() const noexcept { return judged_exactly_; }
   void archive(fieldbus::StateArchive& state) noexcept;
 

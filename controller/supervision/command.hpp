@@ -21,6 +21,6 @@ struct Command {
   double value = 0.0;
 };
 
-using ScheduledCommand = Scheduled<Command>;  // by the time since the first cycle
+using ScheduledCommand = Scheduled<Command>;  // times count from the first cycle
 
 }  // namespace proxarm::controller

@@ -24,9 +24,7 @@
 // way.
 //
 // In the shipped scenes, drives that follow are away by up to 0.024 mrad. At their torque limit they lag, catch up and
-// overshoot. Of 400 random test sessions, with hands of up to a kilonewton, two stop for this reason. In one, axis 5
-// was jammed at 0.8 rad/s for 3.4 ms and then overshot its setpoint by more than 5 mrad. In the other, at 4 ms, a hand
-// of 519 N made a joint oscillate by 8 mrad.
+// may overshoot by 5 to 8 mrad: this stops two of 400 random test sessions with hands of up to a kilonewton.
 //
 // The hand may cause a joint's lag: if its torque about the joint, Jᵀh, holds the joint back with at least a tenth of
 // the drive's minimum torque J_r a, which accelerates the rotor inertia J_r by its limit a. drive_blocked then waits
