@@ -17,7 +17,7 @@
 // A singularity of the wrist itself doesn't affect σ: there, turning lags and the place is kept (arm_step.hpp).
 //
 // σ changes by at most |ΔJ_w| ≤ Σ_k w_k |Δc_k|, w_k² = Σ_j C_kj² (C: Arm::path_curvature()), so far from the border
-// most steps skip it. With P, which may change fast, each step computes a lower bound from a determinant instead. No
+// most steps needn't compute σ. With P, which may change fast, each step computes a lower bound from a determinant. No
 // allocation, lock or throw after construction.
 #pragma once
 

@@ -4,8 +4,8 @@
 //
 // During the tare, the torque of that hold beyond the model's weight, low-passed with 50 ms, is weight missing from the
 // model. More than 2 % of a joint's max_torque_Nm is a fault before anything moves. Less becomes τ_0 and is compensated
-// from the start on. So an empty device stands still where it starts; elsewhere the change of the model's error, less
-// friction, moves it.
+// from the start on. So an empty device stands still where it starts. Elsewhere the model's error is different, and the
+// difference, less friction, moves the device.
 //
 // When nobody holds the handle (handle/empty_handle.hpp), the device is braked at 4 m/s² and its joints are then held
 // in place, with `let_go: hold` as with `rest`; it goes on rendering, since it has no hold. The sensor's bias can't

@@ -56,8 +56,7 @@ class PoseProxy {
 
   // Starts at rest at this pose and time; sets the spring's reference there.
   void start(const models::ToolPose& q, double time_s) noexcept;
-  // Continues from here with this velocity (m/s, rad/s). The reference stays, except that a held orientation is held as
-  // it is here.
+  // Continues from here with this velocity (m/s, rad/s). The reference stays; a held orientation becomes that of q.
   void resume(const models::ToolPose& q, const models::Twist& velocity_W) noexcept;
 
   // p̂ of the next step under the hand's wrench. For limits, the caller may bring p̂ nearer to q before step().

@@ -15,7 +15,7 @@ using models::Vec3;
 
 namespace {
 
-constexpr double rounding_m = 1e-12;  // of positions of some metres, after a few operations
+constexpr double rounding_m = 1e-12;  // rounding of positions of some metres after a few operations
 
 // The anchor of the spring of (26): the start position, except for a while after the spring became stiffer and after a
 // hold.

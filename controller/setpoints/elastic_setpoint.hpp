@@ -41,8 +41,8 @@ class ElasticSetpoint {
   models::JointVector step(const models::JointVector& link_rad) noexcept;
 
   // Torques that the last step requires of the gears, M(q_f) q̈_f + τ_g, with the mean of q̈_f over the step. (At its
-  // end q̈_f is off by ω² q̇_f T/2, because the filter's input is constant over the period. This makes a motor 0.1 ms
-  // early, but its gear doesn't carry it.)
+  // end q̈_f is off by ω² q̇_f T/2, because the filter's input is constant over the period. The motor is therefore 0.1 ms
+  // early, but no gear carries this torque.)
   [[nodiscard]] models::JointVector asked_Nm() noexcept;
   // Jᵀh of a wrench about T.
   [[nodiscard]] models::JointVector joint_torques_Nm(const models::Wrench& wrench_W) const noexcept;

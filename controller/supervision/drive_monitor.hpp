@@ -7,17 +7,17 @@
 //                   tool by more than 5 mm. The drive moves without a setpoint: it runs off, turns the wrong way, can't
 //                   hold the arm's weight, or its encoder is wrong. It can't be asked to stop (stop category 0).
 //   drive_blocked   |d| > ε/2 for half a second, with θ within ε/2 of one place: setpoints wait for a drive that
-//   doesn't
-//                   come. It is jammed, ignores its setpoints, or its encoder is stuck. The hand's setpoints may swing
-//                   about it and pass it repeatedly, so |d| counts for another 50 ms.
+//                   doesn't come. It is jammed, ignores its setpoints, or its encoder is stuck. The hand's setpoints
+//                   may swing about the drive and pass it repeatedly, so |d| counts for another 50 ms.
 // If a joint is behind because its setpoints moved on, `away` stays zero; if the setpoints stand and the joint moves,
-// it equals d. So the monitor tells both apart without the motor's torque. The times may be interrupted: time without
-// the condition is subtracted at a twentieth. So the monitor also finds a joint that swings about its setpoints with
-// the hand, as with a reversed drive, or about which the setpoints swing.
+// `away` equals d. So the monitor tells both apart without the motor's torque. A time above may be interrupted: it
+// shrinks at a twentieth of the rate while its condition isn't met. So the monitor also finds a joint that swings about
+// its setpoints with the hand, as with a reversed drive, or about which the setpoints swing.
 //
 // A drive that brakes by itself (switched off, or out of operation enabled) takes no more setpoints, so they give no
-// envelope. Before, it was within the envelope, and at most as fast as its setpoints within its lag τ. With ṡ the last
-// speed of the setpoints and a its deceleration (6084h, equal to max_acceleration_rad_per_s2), it stops within
+// envelope. When braking began, the drive was within the envelope, and at most as fast as its setpoints within its lag
+// τ. With ṡ the last speed of the setpoints and a the drive's deceleration (6084h, equal to
+// max_acceleration_rad_per_s2), the drive stops within
 //   [l − max(0, aτ − ṡ)²/2a,  h + max(0, aτ + ṡ)²/2a]
 // This interval stays constant and serves as the envelope for `away`. If the setpoints stood, it extends by aτ²/2 to
 // both sides: 0.65 mrad at 30 rad/s² and 1 ms. A drive that has power and takes no setpoints yet is judged in the same
