@@ -1,5 +1,5 @@
-// One step of the arm: finds the joints' step u that brings the tool nearest to a wanted pose, within all limits of the
-// joints and the tool.
+// One step of the arm: finds the joints' step u that brings the tool nearest to a wanted pose, within all limits of
+// joints and tool.
 //
 //   minimise |x(u) − x_d|², and then |R(u) ⊟ R_d|²,   where u ∈ U
 // x, R: the tool's pose by exact kinematics at c(k−1) + u; c: the link angles before the setpoint filter. The sets of
@@ -16,15 +16,14 @@
 // is added for each one that a solution has left.
 //
 // Position has priority over orientation. Near a wrist singularity, joints that can't turn the tool fast enough turn it
-// later; the sets of turning bound that lag. The tool isn't tilted to reach further: if the joints that carry the wrist
-// can't go on, the position gives way. So the followable places (FollowableStep) are those to which these joints can
-// carry the wrist with the tool in its wanted orientation, or, if it turns freely, in that of braking: turning gives
-// way first. The proxy's next place is one of them: the arm is sent to q(k).
+// later; the sets of turning bound that lag. But the tool isn't tilted to reach further: if the joints that carry the
+// wrist can't go on, the position gives way. So the followable places (FollowableStep) are those to which these joints
+// can carry the wrist with the tool in its wanted orientation, or, if it turns freely, in that of braking. The proxy's
+// next place is one of them: the arm is sent to q(k).
 //
 // Each half-space is widened to what the joints can still do, so each single one leaves U nonempty. If several exclude
 // each other, all joints brake together as hard as they can. A force in U's normal cone has f·(u − u_b) ≤ 0 for any
-// step u_b of U: a limit never moves the arm further than braking would. So the arm can return from places beyond a
-// limit.
+// step u_b of U: a limit never moves the arm further than braking would, so the arm can return from beyond a limit.
 //
 // If no set is active, the step is that of the inverse kinematics, to the bit. No allocation, lock or throw after
 // construction.

@@ -16,9 +16,9 @@
 //
 // A singularity of the wrist itself doesn't affect σ: there, turning lags and the place is kept (arm_step.hpp).
 //
-// σ changes by at most |ΔJ_w| ≤ Σ_k w_k |Δc_k|, w_k² = Σ_j C_kj² (C: Arm::path_curvature()), so far from the border
-// most steps needn't compute σ. With P, which may change fast, each step computes a lower bound from a determinant. No
-// allocation, lock or throw after construction.
+// σ changes by at most |ΔJ_w| ≤ Σ_k w_k |Δc_k|, w_k² = Σ_j C_kj² (C: Arm::path_curvature()), so it isn't computed in
+// each step far from the border. With P, which may change fast, a lower bound from a determinant is. No allocation,
+// lock or throw after construction.
 #pragma once
 
 #include <array>

@@ -1,27 +1,25 @@
 // Detects from the measured force alone that nobody holds the handle, so that the proxy is braked to rest and doesn't
-// coast.
+// coast, driven by the sensor's bias.
 //
-// A proxy of mass M that no hand holds keeps its speed, and a sensor bias of some millinewtons accelerates it. The
-// handle counts as empty while the hand's force, behind a low-pass of τ = 15 ms, stays within one of two bands:
+// The handle counts as empty while the hand's force, behind a low-pass of τ = 15 ms, stays within one of two bands:
 //   noise band    8 σ_f + 4 σ/√n    for as long as the proxy needs for 20 mm, 0.06 to 1.5 s
 //   band          empty_handle_N    for as long as the proxy needs for 40 mm, 0.5 to 1.5 s; never narrower than the
 //                                   noise band
-// σ is the standard deviation of a sample, per axis, during the tare. σ_f = σ √(T/2τ) is the noise behind the low-pass,
-// where T is the longer of the sensor's and the controller's periods. σ/√n is the uncertainty of the bias, the mean of
-// n samples. If the noise during the tare wasn't white, a hand may have moved the handle; the noise band is then at
-// most empty_handle_N. A moving hand that needs no force stays within the noise band only for milliseconds. A hand at
-// rest looks like an empty handle, but loses nothing if it counts as absent.
+// σ is the standard deviation of a sample, per axis, during the tare. σ_f = σ √(T/2τ) is the noise behind the low-pass;
+// T is the longer of the sensor's and the controller's periods. σ/√n is the uncertainty of the bias, a mean of n
+// samples. If the noise wasn't white, a hand may have moved the handle during the tare; the noise band is then at most
+// empty_handle_N. A moving hand that needs no force stays within the noise band only for milliseconds. A hand at rest
+// looks like an empty handle, but loses nothing if it counts as absent.
 //
-// The handle counts as held again when the filtered force leaves 1.5 times the band, widened by 1.5 times the tool's
-// inertial force: the mass behind the sensor times the largest acceleration of the last tenth of a second, because the
-// gears ring after it. With `at_once`, a single sample that leaves this by another 8 σ suffices; the samples must then
-// be free of the tool's inertia.
+// The handle counts as held again when the filtered force leaves 1.5 times the band plus 1.5 times the tool's inertial
+// force: the mass behind the sensor times the largest acceleration of the last tenth of a second. With `at_once`, a
+// single sample that leaves this by another 8 σ suffices; the samples must then be free of the tool's inertia.
 //
 // A force that acts at the handle (hand_force.hpp) comes from a hand or a load. However straight in time, it never
 // makes the handle count as led (unexplained_way.hpp).
 //
-// While the handle is empty, a braking force −M v/τ_b of at most M a_b replaces the hand's force. The proxy treats it
-// like any other force: contacts, friction, springs and moving objects act as usual, and nothing jumps.
+// While the handle is empty, a braking force −M v/τ_b of at most M a_b replaces the hand's. The proxy treats it like
+// any other force, so nothing jumps.
 #pragma once
 
 #include "controller/handle/unexplained_way.hpp"

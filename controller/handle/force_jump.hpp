@@ -1,20 +1,20 @@
-// Detects a force that changes faster from sample to sample than a hand can change it, because a sign or an axis of the
-// sensor flips or an offset appears.
+// Detects a force that changes faster than a hand can change it, because a sign or axis of the sensor flips or an
+// offset appears.
 //
 // A hand is a mass on a spring: its force on the handle changes by at most stiffness × relative speed × time between
 // samples. 30,000 N/m (a fist's bones on steel) at 2 m/s give 60 N per millisecond, the default of max_force_step_N. A
-// blow of steel on the handle may be faster, but its force doesn't stay. The detector works on the load y: the reading
-// without bias, the tool's weight included, in S. It compares y(n) with the extrapolation y⁻(n) = y(n−1) + trend; the
-// trend is the change per sample, averaged over some four samples. It looks for four patterns:
+// blow of steel may be faster, but its force doesn't stay. The detector compares the load y(n) (reading without bias,
+// with the tool's weight, in S) with its extrapolation y⁻(n) = y(n−1) + trend; the trend is the change per sample,
+// averaged over some four samples. It looks for four patterns:
 //
 //   flip        y(n) = R y⁻(n), where R is −1 or half a turn about an axis of S. Forces and torques both match, to 2 %
 //               and the noise, and the samples before were calm: a swing through zero also yields its own opposite.
 //               The sensor flips about its true zero: the bias, or the known zero if a hand leaned on the handle during
 //               the tare. At least 1 N if all six channels or the tool's weight flip; 10 N if only the hand's force
 //               does. Found with the first sample.
-//   flip that   the hand's force makes half a turn of 1 to 10 N, which a scripted force may do as well. It is watched
-//   grows       for a second. If it then grows to 2.5 times its size along the same line without another jump, the
-//               hand is holding back an arm that moves the wrong way.
+//   flip that   the hand's force makes half a turn of 1 to 10 N, which a scripted force may do as well. If the force
+//   grows       then grows within a second to 2.5 times its size along the same line, without another jump, the hand
+//               is holding back an arm that moves the wrong way.
 //   step        more than max_force_step_N per millisecond, then within a fifth of the step for 5 ms. A hand's change
 //               in one sample doesn't stay, nor does a blow. A release may be as fast: a step to little force, or back
 //               to the force of up to 50 ms before, doesn't count.
@@ -22,7 +22,7 @@
 //               from the extrapolation. It stays like a step, and it doesn't act at the handle (hand_force.hpp).
 //
 // With slower samples the bound rises in proportion. If the sensor's own filter takes longer than a few samples, a step
-// becomes a ramp, which isn't detected here. No function allocates, locks or throws.
+// becomes a ramp, which isn't detected. No function allocates, locks or throws.
 #pragma once
 
 #include "models/base/archive_fields.hpp"

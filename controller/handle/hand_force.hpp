@@ -2,18 +2,17 @@
 //
 // The sensor reads  hand's wrench + weight and inertia of the tool behind it + zero. motion/wrench_compensation.hpp
 // removes weight and zero; HandForce removes the tool's inertia, so that an empty handle reads zero however the arm
-// moves. The proxy renders the reading with the inertia, because it feels the tool's mass as its own. Checks whether a
-// force is a hand's (empty_handle.hpp, force_plausibility.hpp) use the wrench of HandForce.
+// moves. Only the checks whether a force is a hand's (empty_handle.hpp, force_plausibility.hpp) use this wrench; the
+// proxy feels the tool's mass as its own.
 //
-// The tool's acceleration is estimated from the proxy's by three equal first-order lags. Their sum is the delay from
-// the proxy to the real arm: setpoint filter, drives and two periods. Encoder counts, differentiated twice, may read as
-// more than a child's force. The ringing of the gears remains in the estimate.
+// Three equal first-order lags estimate the tool's acceleration from the proxy's. Their sum is the delay from the proxy
+// to the real arm: setpoint filter, drives and two periods. Encoder counts, differentiated twice, may read as more than
+// a child's force. The ringing of the gears remains in the estimate.
 //
 // A force acts at the handle if its line passes close to the handle's point: |τ| ≤ r |F|. A hand or a load may do so. A
-// sensor's offset has no lever, τ = −p × F (p: handle from sensor), so its line does so only by chance. Therefore |τ|
-// must also be at most a third of |p × F|. The decision needs |p × F| of at least three times the uncertainty of τ.
-//
-// A force acts as an offset if its line passes the sensor's origin, within that uncertainty.
+// sensor's offset has no lever, τ = −p × F (p: handle from sensor), so |τ| must also be at most a third of |p × F|. The
+// decision needs |p × F| of at least three times the uncertainty of τ. A force acts as an offset if its line passes the
+// sensor's origin, within that uncertainty.
 //
 // A hand that pushes during the tare becomes part of the zero. When it lets go, the opposite of its force remains, and
 // acts at the handle. So a force that equals the difference between tare and known zero acts neither at the handle nor

@@ -1,8 +1,8 @@
 // Measures how far a force has moved the handle without any sign that a hand makes it.
 //
-// A hand is an impedance: its force changes with the motion that it causes, and it trembles. A sensor's bias doesn't
-// depend on the motion: it is constant or a straight line in time. So a straight line (least squares, each axis of W)
-// is fitted to all samples since the force last bent. The force bends if the residual variance is more than
+// A hand is an impedance: its force changes with the motion that it causes, and it trembles. A sensor's bias is
+// constant or a straight line in time. So a straight line (least squares, each axis of W) is fitted to all samples
+// since the force last bent. The force bends if the residual variance is more than
 //   σ² (1 + d √(2/(n − 2))) + (s F)²
 // σ is the sensor's noise, n the number of samples, d the accepted number of standard deviations of that estimate. s F
 // is a share of the force, for the tool behind the sensor, which oscillates as the arm starts. No hand leads the handle
@@ -10,14 +10,14 @@
 //
 //   - A bias that drifts or has jumped: the line began at rest (v₀ ≤ 10 mm/s plus the speed that the force adds before
 //     its beginning is seen), and the force is now less than 1.5 N. It needn't have accelerated the proxy.
-//   - A larger bias that has jumped: the line began at rest and has changed by at most a fifth of its present value,
-//     and the force has accelerated the proxy by at least half as much as in free space.
+//   - A larger bias that has jumped: the line began at rest and has changed by at most a fifth of its present value;
+//     the force has accelerated the proxy by at least half as much as in free space.
 //   - A bias of any size and beginning, drifting or not: the line has lasted for a second, with the same acceleration.
 //   - A force left over from a hand that pushed during the tare, or one that acts at the sensor's origin
 //     (hand_force.hpp).
 //
-// The force of a moving hand is occasionally straight for a tenth of a second. A hand without tremor that begins to
-// pull has a straight force for half a second, at some newtons.
+// The force of a moving hand is occasionally straight for a tenth of a second; that of a hand without tremor that
+// begins to pull, for half a second at some newtons.
 //
 // No function allocates, locks or throws.
 #pragma once

@@ -1,6 +1,6 @@
 // Corrects mass and centre of mass of the tool behind the sensor during a session.
 //
-// The correction is for a tool that was mounted during the tare, with wrong figures in the cell. The zero, learnt with
+// The correction is for a tool that was mounted during the tare, with wrong figures in the cell: the zero, learnt with
 // gravity g₀ (in S), then contains a wrong weight. With m, c in place of m₀, c₀ (both about S):
 //   bias   += −(m − m₀) g₀                 as the tare would have found with m, c
 //   hand_S += (m − m₀) d,  torque about S += (m c − m₀ c₀) × d,   d = g₀ − g: change of gravity in S since the tare
@@ -15,9 +15,8 @@
 // doubt() refuses figures that contradict the sensor:
 // - the remembered zero: the tare would differ from it by more than the sensor drifts, and by more than before;
 // - the present reading: the change exceeds the tare's uncertainty, brings the reading neither to half nor within that
-//   uncertainty, and doesn't halve the tare's distance from the remembered zero either.
-// The uncertainty limits this, because even 0.07 N, within the band of an empty handle, may move the handle by 10 mm
-// before it is distinguished from a hand, and further with a load.
+//   uncertainty, and doesn't halve the tare's distance from the remembered zero either. (Even 0.07 N, within the band
+//   of an empty handle, may move the handle by 10 mm before it is distinguished from a hand, and further with a load.)
 //
 // No allocation, lock or throw after construction.
 #pragma once

@@ -1,17 +1,17 @@
 // Motion of the impedance type: joint torques computed from the tool's position (torque_rendering.hpp). Before
-// rendering, torques hold the joints in place. Stops are left to the drives, which ramp any torque to zero (6084h), so
+// rendering, torques hold the joints in place. The drives stop by themselves, ramping any torque to zero (6084h), so
 // this class has neither run-out nor hold.
 //
-// During the tare, the torque of that hold beyond the model's weight, low-passed with 50 ms, is weight missing from the
+// During the tare, the holding torque beyond the model's weight, low-passed with 50 ms, is weight missing from the
 // model. More than 2 % of a joint's max_torque_Nm is a fault before anything moves. Less becomes τ_0 and is compensated
 // from the start on. So an empty device stands still where it starts. Elsewhere the model's error is different, and the
 // difference, less friction, moves the device.
 //
 // When nobody holds the handle (handle/empty_handle.hpp), the device is braked at 4 m/s² and its joints are then held
-// in place, with `let_go: hold` as with `rest`; it goes on rendering, since it has no hold. The sensor's bias can't
-// move such a device, so no force counts as a bias. But a tool whose mass differs from the model's reads as a force
-// after it has turned, and lifts or drags the device: by τ_0 as a force at the tool, if it has turned by 60 degrees and
-// only the tool is wrong. The handle counts as empty below that force, too.
+// in place while it goes on rendering, with `let_go: hold` as with `rest`. The sensor's bias can't move such a device,
+// so no force counts as a bias. But a tool whose mass differs from the model's reads as a force after it has turned,
+// and lifts or drags the device: by τ_0 as a force at the tool, if it has turned by 60 degrees and only the tool is
+// wrong. The handle counts as empty below that force, too.
 #pragma once
 
 #include <memory>

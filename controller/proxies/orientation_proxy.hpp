@@ -7,16 +7,15 @@
 // constant torque gives the exact parabola of angles; with damping ω tends to τ/D for any T.
 //
 // The hand feels the tool behind the sensor directly, as with the mass. The tool's inertia I about the rendered point
-// is a tensor that turns with the tool. So J E − R I Rᵀ replaces J, and the gyroscopic torque ω × R I Rᵀ ω, which the
-// sensor reads, is added back. The hand then feels J about every axis. (A centre of mass beside the rendered point also
-// couples turning with moving. A point tool neglects this; a rigid tool doesn't: pose_proxy.hpp.)
+// turns with the tool. So J E − R I Rᵀ replaces J, and the gyroscopic torque ω × R I Rᵀ ω, which the sensor reads, is
+// added back: the hand feels J about every axis. (A centre of mass beside the rendered point also couples turning with
+// moving. A point tool neglects this; a rigid tool doesn't: pose_proxy.hpp.)
 //
 // Limits: the motion is projected onto the sets of turning (turn_sets.hpp), counted from the orientation at the first
 // start. The projected motion becomes the history, so nothing winds up.
 //
-// The spring's R_ref is the orientation at the first start. After the spring becomes stiffer, R_ref jumps to the place
-// that keeps the spring's torque; after a hold, to zero torque. It then returns at TurnSets::returning_rad_per_s. So
-// the torque never jumps.
+// The spring's R_ref is the orientation at the first start. When the spring becomes stiffer, R_ref jumps to the place
+// that keeps the spring's torque; after a hold, to zero torque. It then returns at TurnSets::returning_rad_per_s.
 //
 // τ: torque about the rendered point, in W. R_WT is kept a unit quaternion. One caller at a time. step() may be called
 // in the cycle: it doesn't allocate, lock, throw or print.

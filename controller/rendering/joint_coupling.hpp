@@ -21,19 +21,19 @@
 // - A limit's torque acts on its own joint: M(c − φ̂) = −Σ λ_i n_i, n_i: active rows of U.
 // - U is convex and contains 0, so (c − c₁)ᵀτ ≤ 0 before the mean: no torque of U drives the joints' proxy.
 //
-// If a drive can't give the whole torque, the proxy yields: with the share s that was given, c(k) = φ̂ + s (c − φ̂),
-// outside the sets (set-valued form: Kikuuwe, IEEE Trans. Robotics 35:5, 2019). So nothing winds up: a hand that has
-// overpowered a joint and lets go isn't pulled back.
+// If a drive can give only the share s of the torque, the proxy yields: c(k) = φ̂ + s (c − φ̂), outside the sets
+// (set-valued form: Kikuuwe, IEEE Trans. Robotics 35:5, 2019). So nothing winds up: a hand that has overpowered a joint
+// and lets go isn't pulled back.
 //
 // A rendered force f may release the tool only as fast as Bounds allows. The torque that prevents more is subtracted
 // from f: its multiplier is at most |f|. 25 N at 750 N/m store 0.4 J, which would throw 0.5 kg at 1.3 m/s.
 //
 // Stability. M is the metric, so with rigid gears the loop doesn't depend on the pose. Let M_t be the true mass matrix
 // (M plus the hand's mass) and M_t x = r M x in each mode x, so r ≥ 1. Then the loop is K = γ/t², B = β/t on a mass r
-// (torque_rendering.hpp), delayed by the mean; with fewer active rows, K and B are smaller matrices. But gears swing:
-// above the resonance only the rotor responds, and a torque delayed by 1.5 T drives vibrations above 120 Hz. The mean
-// over 5 ms has its zero at 200 Hz and reverses the sign beyond. joint_coupling_test.cpp has the spectral radii: below
-// 1 for rigid gears, r from 0.7 on and periods of 0.5 to 4 ms; and at 1 ms for the simulated gears of
+// (torque_rendering.hpp), delayed by the mean; with fewer active rows, K and B are smaller matrices. But above a gear's
+// resonance only the rotor responds, and a torque delayed by 1.5 T drives vibrations above 120 Hz. The mean over 5 ms
+// has its zero at 200 Hz and reverses the sign beyond. joint_coupling_test.cpp has the spectral radii: below 1 for
+// rigid gears, r from 0.7 on and periods of 0.5 to 4 ms; and at 1 ms for the simulated gears of
 // models/cells/light.yaml: 200 Hz with links of 0.034 kg m² and more, rotors of 0.06. Gears that swing between 70 and
 // 180 Hz make the loop unstable.
 #pragma once

@@ -1,9 +1,9 @@
 // Computes motor setpoints that move the links through elastic gears to the wanted angles.
 //
 // Encoders sit on the motors, so a drive that follows its setpoints exactly leaves the links oscillating at the arm's
-// elastic modes (8–20 Hz, hardly damped). Masses after the force sensor feed that motion back as force. With a mass m_h
-// after the sensor and a delay L, a mode ω of damping ζ is stable only for m_h/M < 2ζ/(ω L): below a few kilograms of
-// felt mass M the loop is unstable. So the setpoints come from the arm's model:
+// elastic modes (8–20 Hz, hardly damped). Masses after the force sensor feed that motion back as force: with a mass m_h
+// after the sensor and a delay L, a mode ω of damping ζ is stable only for m_h/M < 2ζ/(ω L), so not below a few
+// kilograms of felt mass M. Therefore the setpoints come from the arm's model:
 //
 //   q̈_f = ω²(q − q_f) − 2ω q̇_f                     a critically damped filter of the wanted link angles q
 //   θ = q_f + K⁻¹[M(q_f) q̈_f + τ_g(q_f)]            motor angles whose gears carry this acceleration and gravity
@@ -11,8 +11,7 @@
 // Links that obey the model follow q_f without oscillation and without overshoot at a wall. The price is a delay of
 // 2/ω, which the stability check includes. Coriolis torques are left out: at 0.5 m/s they bend the gears by some
 // micrometres. The hand's wrench isn't compensated: at the wrist, where the hand's mass is as large as the links', the
-// reaction would come too late and make wall contact chatter. With bandwidth_Hz = 0 there is no filter, and only
-// gravity is compensated.
+// reaction would come too late and make wall contact chatter. With bandwidth_Hz = 0 only gravity is compensated.
 //
 // No allocation, lock or throw after construction.
 #pragma once

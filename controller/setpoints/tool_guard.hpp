@@ -1,7 +1,7 @@
 // Final check of where and how fast setpoints move the tool, independent of all stages before.
 //
 // A setpoint θ stands for the arm at rest there, with gears twisted by gravity alone: θ = q + K⁻¹τ_g(q). p(θ) is the
-// position of T, or of a joint from the third on (elbow and wrist), by exact kinematics, not by a Jacobian. Bounds:
+// position of T, or of a joint from the third on (elbow and wrist), by exact kinematics. Bounds:
 //   speed         |p(θ) − p(θ₁)| ≤ vT; v = limits.max_tool_speed_m_per_s for T, max_elbow_speed_m_per_s for joints
 //   borders       T within limits.workspace_m and outside limits.keep_out_m, also between two setpoints
 //   turning       angle from the start, tilt, twist and turning speed, if the tool turns
@@ -14,9 +14,9 @@
 // The bounds must also hold on the way to rest. From θ, with the speed u = (θ − θ₁)/T, all joints brake together along
 // u, in the time t that the slowest needs at its own deceleration:
 //   θ_b = θ + (1 − T/t)uT and so on,   t = max_i |u_i|/a_i
-// Braking needs no check, because it was checked when the setpoint before it was accepted. If a wanted setpoint breaks
-// a bound, bisection finds the setpoint furthest along the straight line (in joint space) from θ_b to the wanted one
-// that keeps all bounds. By induction from rest, θ_b always keeps them.
+// Braking was checked when the setpoint before it was accepted. So if a wanted setpoint breaks a bound, bisection finds
+// the setpoint furthest along the straight line (in joint space) from θ_b to the wanted one that keeps all bounds. By
+// induction from rest, θ_b always keeps them.
 //
 // The way to rest is checked by bounds of the path, not point by point. With C of Arm::path_curvature(),
 // V = |p(θ) − p(θ₁)|/T and B = t |u|ᵀC|u|, the speed of p after the share y of the time t is at most (1 − y)(V + yB).
