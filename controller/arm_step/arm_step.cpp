@@ -397,8 +397,8 @@ double ArmStep::least(const JointVector& a) const noexcept {
   return (a.array() * (a.array() > 0.0).select(whole_.low, whole_.high).array()).sum();
 }
 
-// Adds a·u ≤ b, widened to what the joints can still do. Returns whether this excludes `step`. Sets that braking leaves
-// as well, or that are left by the curvature along their border, exclude nothing.
+// Adds a·u ≤ b, widened to what the joints can still do. Returns whether this excludes `step`. It doesn't if braking
+// leaves the set as well, or if only the curvature along the border does.
 bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVector& step) noexcept {
   const Row row{a, std::max(b, least(a)), limit};
   if (a.dot(step) <= row.b + set_tolerance) return false;
