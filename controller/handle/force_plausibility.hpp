@@ -9,7 +9,7 @@
 //      2. A bias on top of the force lowers it, but matters less and less. A hand whose force begins as tⁿ gives
 //      2^(n/(n+2)): 1.26 for n = 1, when it begins to accelerate the arm, and less later; 1.52 for n = 3, when it sets
 //      out without a jerk. If the arm yields to the force, the factor is larger.
-//      Where damping takes most of the force (B > M λ, possible with passivity damping), the factor must be at least
+//      If damping takes most of the force (B > M λ, possible with passivity damping), the factor must be at least
 //      1.6, since such a hand gives 2^(n/(n+1)): 1.41 for n = 1 and 1.59 for n = 2. Above some 800 Ns/m a reversed
 //      force looks like a hand's. The last factor must also be at least 0.85 of the largest. A bias makes the factors
 //      rise towards 2; for a hand to which the arm yields they fall (2.00, 1.94, 1.51, 1.67: once in 18 hours of a

@@ -48,7 +48,7 @@ class ElasticSetpoint {
 
   // Its output is the commanded link angles and speeds.
   [[nodiscard]] const LinkFilter& filter() const noexcept { return filter_; }
-  // Of the tool at the filter's output.
+  // The tool at the filter's output.
   [[nodiscard]] const models::ToolKinematics& kinematics() const noexcept { return kinematics_; }
   void archive(fieldbus::StateArchive& state) noexcept;
 
