@@ -4,8 +4,7 @@
 //   /tool, /proxy      foxglove.PoseInFrame       poses in W
 //   /wrench            proxarm.Wrench             the hand's, in W
 //   /contact           proxarm.Contact            the world's force on the proxy, normal, friction, distances
-//   /contacts          proxarm.Contacts           each recorded contact: place, normal, force, torque, object, part,
-//   gap
+//   /contacts          proxarm.Contacts           each contact: place, normal, force, torque, object, part, gap
 //   /contact_arrows    foxglove.SceneUpdate       the contacts' forces at their places
 //   /joint_states      proxarm.JointStates        commanded and measured
 //   /session           proxarm.Session            phase, limits, fault, mass
