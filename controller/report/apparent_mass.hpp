@@ -5,13 +5,13 @@
 // motion. For F = M a + B v + N ȧ they satisfy F̂(ω) = M â(ω) + B v̂(ω) + N ĵ(ω) at every ω and for any window. M
 // follows by least squares over the band, all axes and all segments:
 //   [M, B, N] = argmin Σ |F̂ − M â − B v̂ − N ĵ|²,   ω = 2π · (0.3, 0.35, … 2.0 Hz)
-// M is Re(F/a): in a long record a is orthogonal to v and ȧ, and M = Re Σ F̂ â* / Σ |â|². In a short record a isn't
-// orthogonal to ȧ, and without the third term a tool that lags (F = M a(t + τ), so N = Mτ) would seem lighter. The
-// damping is ω Im(F/a) as one number: B of the fit without ĵ. A lag τ makes it negative, by about Mω²τ. A constant
-// force (sensor offset, leaning hand) is removed per segment and axis by projecting out the window's own transform.
+// M is Re(F/a): in a long record a is orthogonal to v and ȧ, and M = Re Σ F̂ â* / Σ |â|². In a short record it isn't,
+// and without the third term a tool that lags (F = M a(t + τ), N = Mτ) would seem lighter. The damping is −ω Im(F/a) as
+// one number: B of the fit without ĵ; a lag τ makes it negative, by about Mω²τ. A constant force (sensor offset,
+// leaning hand) is removed per segment and axis by projecting out the window's transform.
 //
-// Works for a short move between two contacts as well as for minutes of a multisine. A segment ends after 10 s; one
-// that is shorter than 0.5 s or moves less than 1 mm is left out. Memory is bounded by one segment. Not for the cycle.
+// Works for a short move as well as for minutes of a multisine. A segment ends after 10 s; one that is shorter than 0.5
+// s or moves less than 1 mm is left out. Memory is bounded by one segment. Not for the cycle.
 #pragma once
 
 #include <array>
@@ -39,7 +39,7 @@ class ApparentMass {
     double damping_Ns_per_m = 0.0;
     double used_s = 0.0;  // length of the segments used
   };
-  // From all segments that have ended; nullopt if none was usable.
+  // From all finished segments; nullopt if none was usable.
   [[nodiscard]] std::optional<Estimate> estimate() const;
 
  private:
@@ -66,9 +66,8 @@ class FeltMassCurve {
  public:
   explicit FeltMassCurve(double period_s);
 
-  // Adds a sample of free motion, one period after the last one.
+  // As in ApparentMass.
   void add(const models::Vec3& force_N, const models::Vec3& position_m);
-  // Free motion is interrupted.
   void end_segment();
 
   struct Point {

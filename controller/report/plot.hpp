@@ -1,5 +1,4 @@
-// Draws a session as a picture (SVG, by gnuplot): tool and proxy against the wall and along it, forces, contact phases
-// as bands.
+// Draws a session as a picture (SVG, by gnuplot): positions of tool and proxy, forces, contact phases as bands.
 //
 // With a contact, positions are split along the first contact's normal and the direction in which the proxy slid
 // farthest; the surface is at 0. Without one, the panels show x, y and z. For a tool that turns, two more panels show

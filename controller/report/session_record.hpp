@@ -59,7 +59,6 @@ class SessionWriter {
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
 
  private:
-  // A lock on a folder.
   class Lock {
    public:
     // Doesn't block. Returns whether the lock is held.

@@ -18,7 +18,7 @@
 //                           tracking_lag_rms_m, …_max_m: ‖x(t_k) − q(k − 1)‖, lag included: q(k − 1) is the proxy
 //                           at t_k
 //   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion: no limit acts, and the world's force on the
-//                           proxy is below 1 mN (apparent_mass.hpp); apparent_damping_Ns_per_m is its Im
+//                           proxy is below 1 mN (apparent_mass.hpp); apparent_damping_Ns_per_m from its Im
 //   felt_mass, _band_Hz     F_h/a by frequency, and the frequency up to which |F_h/a − M|/M stays within each limit,
 //                           in the same free motion (FeltMassCurve); _band_Hz_along: along each axis of W
 //   apparent_inertia_kg_m2  the same for rotation, from the hand's torque about the rendered point and the tool's

@@ -76,7 +76,6 @@ class Lines {
   bool colour_;
 };
 
-// Time, processor time and bus load.
 void tell_time(const Summary& s, Lines& line) {
   line("time", format("%.3f s in ", s.simulated_time_s) + std::to_string(s.cycles) + " cycles, " +
                    format("%.3f s of it rendered; ", s.rendered_time_s) + format("wall clock %.2f s: ", s.wall_time_s) +
@@ -181,7 +180,6 @@ void tell_unresolved(const Summary& s, Lines& line) {
        VerdictTone::look);
 }
 
-// What was felt, and how accurately.
 void tell_motion(const Summary& s, Lines& line) {
   line("apparent mass", apparent_mass(s) + drag(s.apparent_damping_Ns_per_m, "Ns/m", "%.2f ") +
                             (s.limited_cycles > 0 ? "; where no limit acts" : ""));
@@ -237,7 +235,6 @@ std::string hands_off(const Summary& s) {
   return format("%.3g s: nobody at the handle, the arm stands", s.hands_off_s);
 }
 
-// Whether the loop was stable with this hand.
 void tell_oscillation(const Summary& s, Lines& line) {
   if (!s.oscillation) return;
   if (s.oscillation->duration_s == 0.0) return line("oscillation", "none");
@@ -286,7 +283,6 @@ std::string view_text(const std::optional<ViewSummary>& view) {
          " viewers at most, who may " + (view->may_change ? "change the session, too" : "only look");
 }
 
-// Notices, faults and other events.
 void tell_events(const Summary& s, Lines& line) {
   for (const NoticeSummary& notice : s.notices) {
     const std::string times = notice.times == 1 ? "once" : std::to_string(notice.times) + " times";

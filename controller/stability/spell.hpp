@@ -6,9 +6,9 @@
 // and limit cycles at walls vary.
 //
 // A longer memory would miss an unstable loop that after a jerk settles below half of the jerk's size. A shorter one
-// would count oscillations that decay. If the amplitude falls by e in τ_a, ⟨x̃²⟩ falls to a half in τ_a/2.9 and to nine
-// tenths in τ_a/19; the average takes some 0.25 s to rise. So a swing below nine tenths of the largest must have gone
-// on for decaying_s: in the 0.85 s after the rise, all with τ_a < 2.4 s have halved. A swing above nine tenths after
+// would count decaying oscillations: with the amplitude's time constant τ_a, ⟨x̃²⟩ falls to a half in τ_a/2.9 and to
+// nine tenths in τ_a/19. A swing below nine tenths of the largest must have gone on for decaying_s. The average takes
+// some 0.25 s to rise; in the remaining 0.85 s all with τ_a < 2.4 s have halved. A swing above nine tenths after
 // lasting_s has a τ_a of 4 s or more.
 //
 // If ⟨x̃²⟩ falls to a sixteenth, the spell is over, and a new one begins. Below the amplitude felt_m, a spell must go

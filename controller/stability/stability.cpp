@@ -325,7 +325,6 @@ std::pair<LoopModel, LoopModel> both_methods(const LoopModel& loop) {
   return {free, at_events};
 }
 
-// The loop with only these touches.
 LoopModel with_layers(const LoopModel& loop, std::vector<LayerTouch> layers) {
   LoopModel with = loop;
   with.layers = layers.empty() ? nullptr : std::make_shared<const std::vector<LayerTouch>>(std::move(layers));
@@ -412,7 +411,6 @@ bool with_margins(const HandModel& hand, const LoopModel& loop,
 
 namespace {
 
-// A hand, and the loop that it closes.
 struct Held {
   HandModel hand;
   LoopModel loop;

@@ -64,7 +64,7 @@ struct LoopModel {
   bool feed_forward = false;           // with arms: the drives follow by feed-forward instead of a lag
                                        // (elastic_loop.hpp)
   bool either_drive = true;            // with arms: a mass must be stable with both kinds of drive
-  double handle_mass_kg = 0.0;         // mass after the sensor
+  double handle_mass_kg = 0.0;         // mass behind the sensor
   double damping_Ns_per_m = 0.0;       // B ≥ 0 of the proxy
   double spring_N_per_m = 0.0;         // K_v ≥ 0 of the proxy
   bool explicit_damping = false;       // −B(q₁ − q₂)/T instead of the implicit damping; order 1, for comparison

@@ -38,7 +38,6 @@ void put_time(JsonText& json, std::int64_t time_ns) {
   json.begin_object().add("sec", time_ns / 1'000'000'000).add("nsec", time_ns % 1'000'000'000).end();
 }
 
-// The beginning that most messages share.
 JsonText begin_message(std::int64_t time_ns) {
   JsonText json;
   put_time(json.begin_object().name("timestamp"), time_ns);

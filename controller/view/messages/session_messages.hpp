@@ -37,8 +37,8 @@ inline constexpr std::size_t topic_count = static_cast<std::size_t>(Topic::conta
 
 struct TopicDescription {
   const char* topic;
-  const char* schema;       // its name
-  std::string json_schema;  // its text
+  const char* schema;
+  std::string json_schema;
 };
 [[nodiscard]] const TopicDescription& describe(Topic topic);
 

@@ -24,7 +24,6 @@ class LiveSource {
   bool advance();
   // Returns the moment of these cycles. Precondition: advance() has returned true since the last call.
   Moment take();
-  // Encodes this moment as a message of the wire.
   [[nodiscard]] std::string encode(const Moment& moment);
 
   // The session's settings after all cycles that were read. The second function returns true once after each change.

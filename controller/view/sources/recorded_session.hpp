@@ -14,7 +14,6 @@
 
 namespace proxarm::view {
 
-// An event in a record that is worth a look.
 struct RecordedEvent {
   enum class Kind : std::uint8_t { contact, limit, phase, fault };
   Kind kind = Kind::contact;
@@ -42,7 +41,6 @@ class RecordedSession {
 
   // Precondition of all: index < size().
   [[nodiscard]] Moment moment(std::size_t index) const;
-  // Encodes this moment as a message of the wire.
   [[nodiscard]] std::string encode(std::size_t index) const;
   // The handle's vibration in the second that ends with this cycle; empty if there is no such second.
   [[nodiscard]] std::vector<controller::HandleSpectrum::Band> spectrum(std::size_t index) const;

@@ -26,13 +26,11 @@ void put(JsonText& json, const Pose& X) {
   json.end();
 }
 
-// Adds a vector or a pose as a member of the present object.
 template <typename Value>
 void add(JsonText& json, const char* name, const Value& value) {
   put(json.name(name), value);
 }
 
-// Adds a capsule or a cylinder.
 template <typename Round>
 void add_round(JsonText& json, const Round& shape) {
   add(json, "from", shape.from_m);

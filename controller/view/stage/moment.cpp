@@ -12,7 +12,6 @@ using controller::CycleRecord;
 using controller::Triple;
 using models::Vec3;
 
-// A field: its name and how its number is computed.
 struct Field {
   const char* name;
   double (*value)(const Moment&);
@@ -63,7 +62,6 @@ constexpr std::array fields{
     Field{"room_z", [](const Moment& m) { return m.room ? m.room->normal_W.z() : unknown; }},
 };
 
-// A vector: one name, three numbers.
 struct VectorField {
   const char* name;
   Triple CycleRecord::*value;

@@ -41,15 +41,14 @@ struct Moment {
   double handle_mass_kg = 0.0;    // mass of the tool behind the sensor, which the hand feels in addition to the proxy's
   std::uint32_t flags_since = 0;  // all RecordFlags since the last moment
   double compute_peak_us = 0.0;   // longest time of these cycles
-  double hand_peak_N = 0.0;       // the hand's largest force
-  double contact_peak_N = 0.0;    // the world's largest force
-  std::uint64_t overruns = 0;     // since the session began
-  Blow blow;                      // of the last touch
-  std::optional<Room> room;       // absent: nothing within Room::most_m
+  double hand_peak_N = 0.0;
+  double contact_peak_N = 0.0;
+  std::uint64_t overruns = 0;                                  // since the session began
+  Blow blow;                                                   // of the last touch
+  std::optional<Room> room;                                    // absent: nothing within Room::most_m
   models::Quaternion tool_q = models::Quaternion::Identity();  // of the tool in W, by the encoders
 };
 
-// Accumulates what happens between two moments.
 class MomentBuilder {
  public:
   explicit MomentBuilder(double handle_mass_kg) noexcept { next_.handle_mass_kg = handle_mass_kg; }
@@ -68,7 +67,6 @@ class MomentBuilder {
 [[nodiscard]] const std::vector<std::string>& contact_field_names();
 void append_fields(std::vector<double>& row, const Moment& moment);
 
-// A complete message.
 std::string encode_moment(const Moment& moment, std::span<const models::Pose> links,
                           std::span<const models::Pose> objects);
 // `rows`: fields of several moments, one after the other.

@@ -1,4 +1,4 @@
-// A file that the server sends, and what it tells the browser about it.
+// A file that the server sends, with its headers.
 #pragma once
 
 #include <filesystem>

@@ -23,7 +23,6 @@ inline constexpr auto patience = std::chrono::seconds(5);    // for a request's 
                                                              // nothing
 inline constexpr auto idle_time = std::chrono::seconds(20);  // between two requests on one connection
 
-// A connection, as an element of the list of all.
 class Connection {
  public:
   Connection() = default;
