@@ -56,8 +56,8 @@ struct TrialResult {
 // Runs a trial. Throws SetupError if the session can't begin.
 using ArmTrial = std::function<TrialResult(const Trial&)>;
 
-// The tool counts as stopped once it stays within this distance of its final place, m. Skin yields more than that, and
-// elastic gears may oscillate within it for some tenths of a second after a stop.
+// The tool counts as stopped once it stays within this distance of its final place, m. It is smaller
+// than the yielding of skin; elastic gears may oscillate within it for some tenths of a second after a stop.
 inline constexpr double stopped_within_m = 1e-3;
 // At the end of a trial, a tool slower than this counts as at rest, m/s: the speed of an oscillation of 0.1 mm at 16
 // Hz, an arm's first mode.

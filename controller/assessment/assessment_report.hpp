@@ -16,7 +16,7 @@ struct Subject {
   double assumed_brake_delay_s = 0.0, assumed_brake_share = 0.0;  // the share is of max_torque_Nm
 };
 
-// The regions for which a body of their stiffness exceeds the thresholds, joined by names: "hands and fingers".
+// Names of the regions whose thresholds a body with the region's stiffness exceeds, such as "hands and fingers".
 std::vector<std::string> exceeded(const Assessment& assessment, const Thresholds& thresholds);
 
 std::string text(const Subject& subject, const Assessment& assessment, const Thresholds& thresholds);

@@ -19,7 +19,7 @@ constexpr Colour table[] = {
     {"accent", "#0072b2", "#56b4e9"},
     {"world-top", "#eef2f6", "#1d2630"},
     {"world-bottom", "#d9e0e7", "#0d1217"},
-    // What acts.
+    // Proxy, tool, hand, contacts.
     {"proxy", "#0072b2", "#56b4e9"},
     {"tool", "#803000", "#ffc61a"},
     {"hand", "#561a7d", "#d849f5"},

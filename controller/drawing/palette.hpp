@@ -42,7 +42,8 @@ struct SeriesStyle {
 std::span<const Colour> colours() noexcept;
 std::span<const LineStyle> line_styles() noexcept;
 std::span<const SeriesStyle> series_styles() noexcept;
-// The colours of a map, from its smallest to its largest value, each lighter than the next, so they differ without hue.
+// The colours of a map, from its smallest to its largest value, each lighter than the next, so that they differ also
+// without hue.
 std::span<const char* const> map_colours() noexcept;
 
 // Precondition: the table contains the name.

@@ -47,7 +47,8 @@ struct Normal {
     A += weight * J.transpose() * J;
     a += weight * J.transpose() * r;
   }
-  // Three unknowns from `first` on, now `x`, are expected to be 0 with this standard deviation; 0 fixes them.
+  // Three unknowns from `first` on, now `x`, are expected to be 0 with this standard deviation; a deviation of 0 fixes
+  // them.
   void expect_zero(int first, const Vec3& x, double deviation) {
     constexpr double surely = 1e-9;  // N, Nm, rad: far below any sensor's accuracy
     const double weight = 1.0 / std::max(deviation * deviation, surely * surely);

@@ -18,8 +18,8 @@ using models::Vec3;
 using proof::Station;
 
 constexpr std::size_t wrist_joints = 3;
-// Seven poses beside the first give 27 force readings for 13 unknowns; all 5,040 rounds can be tried. Fewer than five
-// aren't enough.
+// Seven poses in addition to the first give 27 force readings for 13 unknowns; all 5,040 rounds can be tried. Fewer
+// than five aren't enough.
 constexpr std::size_t chosen = 7, least_chosen = 5;
 constexpr double shares[] = {1.0, 0.5, 0.25, 0.125};  // shares of most_turn_rad that are tried for a joint
 // Poses whose weight directions are closer than this count as the same.

@@ -37,7 +37,7 @@ inline constexpr double proof_speed_m_per_s = 0.1;
 // What the person is asked to do; another thread may read it.
 enum class Asked : std::uint8_t { nothing, press, push, let_go };
 
-// Stations from the motors' initial angles, and the time at each: before reading, and reading.
+// The stations, computed from the motors' initial angles, and the times for settling and reading at each station.
 struct Task {
   std::function<std::vector<Station>(const models::JointVector& motor_rad)> stations;  // empty: plan()
   double settle_s = 0.4, read_s = 0.3;

@@ -49,7 +49,7 @@ enum class RecordFlag : std::uint32_t {
   ramp_in = 1u << 24,  // only a share of the hand's force is let in
   slowed = 1u << 25,   // the tool's speed limit is below the cell's, because of a fault
   oscillation_lasts = 1u << 26,
-  power_cut = 1u << 27,    // stop of category 0: the drives are told to cut their power at once
+  power_cut = 1u << 27,    // stop of category 0: the drives are ordered to cut their power at once
   unresolved = 1u << 28,   // no solution was found that keeps all laws of contact
   sample_late = 1u << 29,  // the sensor's sample belongs to the cycle before, which waited for it in vain
 };

@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using description::SetupError;
 
-// Upper bound for the claims of a file, far above a real cycle: a period of 100 ms on eight buses at 1 Mbit/s.
+// Upper bound for counts in a file, far above a real cycle: a period of 100 ms on eight buses at 1 Mbit/s.
 constexpr std::uint32_t most_frames_per_cycle = 16384;
 constexpr std::size_t most_entry_bytes = most_frames_per_cycle * 96 + 4096;
 constexpr std::size_t block_bytes = 1 << 18;

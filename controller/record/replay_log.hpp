@@ -22,7 +22,7 @@ namespace proxarm::controller {
 
 inline constexpr const char* replay_folder = "replay";
 
-// The session's settings; the files' contents are apart.
+// The session's settings, without the files' contents.
 struct ReplayHead {
   SessionSettings settings;
   std::uint32_t axes = 0;

@@ -253,7 +253,7 @@ std::string plot_headline(const Summary& summary);
 
 struct SummaryLook {
   bool verbose = true;  // all figures, some twenty lines; else eight, plus one for each problem
-  bool colour = false;  // of the verdict and of problems, for terminals (terminal.hpp)
+  bool colour = false;  // colours verdict and problems, for terminals (terminal.hpp)
 };
 // For people: a table of names and values.
 std::string summary_text(const Summary& summary, const SummaryLook& look = {});

@@ -356,7 +356,7 @@ void tell_in_brief(const Summary& s, Lines& line) {
   tell_faults(s, line);
 }
 
-// Where the felt mass was nearest to the smallest stable mass; nothing if that wasn't searched.
+// The place where the felt mass was nearest to the smallest stable mass, if that was searched.
 void tell_margin(const Summary& s, Lines& line) {
   const auto share = [](const PassedPoses::Place& place) {
     return place.smallest_stable_mass_kg ? place.felt_mass_kg / *place.smallest_stable_mass_kg : 0.0;

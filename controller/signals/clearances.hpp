@@ -1,4 +1,4 @@
-// Distances of proxy and tool to the nearest surface; only the scene knows them, and the cycle doesn't compute them.
+// Computes the distances of proxy and tool to the nearest surface, which the cycle leaves out.
 #pragma once
 
 #include <cstdint>

@@ -26,8 +26,8 @@
 //
 // A lag lowers the gain of fast modes, to 0.78 at 80 Hz with a bandwidth of 100 Hz; feed-forward raises it, to 1.15 at
 // 80 Hz and 1 ms. f is the setpoints' speed, on a straight line from the last segment's speed to the present one's. On
-// average it is half a period behind r, so position and speed disagree, and θ overshoots. With feed-forward ∫ is left
-// out, which changes θ by 1 %.
+// average it is half a period behind r, so position and speed disagree, and θ overshoots. With feed-forward the
+// integral part is left out, which changes θ by 1 %.
 //
 // The true gear stiffness may differ from the controller's value: in k but not in k⁻¹ (gear_stiffness_ratio).
 //

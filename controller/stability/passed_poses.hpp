@@ -4,8 +4,8 @@
 // far more.
 //
 // A place is judged if the tool is at least 50 mm or 0.1 rad (are_near()) from all places judged before with the same
-// proxy. This takes milliseconds; for a tool that turns some forty, and half a second if the place is unstable; so
-// judge() never runs in the cycle. Nothing is judged while mass, inertia or damping change from one cycle to the next.
+// proxy. judge() never runs in the cycle: it takes some milliseconds, with a tool that turns some forty, and half a
+// second if the place is unstable. Nothing is judged while mass, inertia or damping change from one cycle to the next.
 #pragma once
 
 #include <cstddef>

@@ -84,7 +84,7 @@ class PoseLoop {
 };
 
 // Builds the loop with the arm in this pose. The touched places of `model` are from T in T's axes. The cell determines
-// what hangs behind the sensor. The horizon and order of its loop are ignored: only positions are predicted, and
+// what hangs behind the sensor. The horizon and order of `model.loop` are ignored: only positions are predicted, and
 // rotation and contacts are computed with order 1.
 PoseLoop pose_loop_at(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell,
                       PoseLoopModel model);

@@ -1,4 +1,4 @@
-// Decides whether an oscillation lasts: then the loop is unstable with this hand. A blow rings and dies away.
+// Decides whether an oscillation lasts, because the loop is unstable with this hand, or dies away, like a blow's.
 //
 // A spell is an oscillation, pauses up to pause_s included: a wall interrupts it in every period. Its size is ⟨x̃²⟩,
 // half of the amplitude squared (passivity.hpp). It lasts if it has gone on for lasting_s and ⟨x̃²⟩ is at least half of

@@ -6,8 +6,7 @@
 namespace proxarm::controller {
 
 // An oscillating mode above 3 Hz (faster than deliberate hand motion), and an upper bound on its decay to a tenth.
-// Friction in the drives isn't modelled and shortens the decay: on the default cell with 2 kg, to between a sixth and a
-// half.
+// Friction in the drives isn't modelled. It shortens the decay: on the default cell with 2 kg by a factor of 2 to 6.
 struct Swing {
   double frequency_Hz = 0.0, tenth_s = 0.0;
 };

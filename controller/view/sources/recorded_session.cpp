@@ -85,7 +85,7 @@ void RecordedSession::find_events() {
   CycleRecord last = signals_.row(0);
   std::int64_t rendered = 0, limited_ns = -apart_ns, touched_ns = -apart_ns, since_ns = 0;
   std::int64_t longest_ns = -1;
-  std::size_t lasting = 0;  // the first cycle whose contact has lasted, else the nearest one to that
+  std::size_t lasting = 0;  // the first cycle whose contact has lasted long enough, else the end of the longest contact
   const auto add = [&](RecordedEvent::Kind kind, std::size_t at, const CycleRecord& record, std::string text) {
     if (events_.size() < most_events) {
       events_.push_back({kind, at, 1e-9 * static_cast<double>(record.time_ns), std::move(text)});

@@ -77,7 +77,7 @@ Vec3 strongest_normal(const CycleRecord& record) {
   return normal;
 }
 
-// How far along `normal`, up to Room::most_m, the tool can go until it is deeper in an object than at the beginning.
+// The distance along `normal`, up to Room::most_m, after which the tool is deeper in an object than at the beginning.
 template <typename Gap>
 double way_to_other_side(const Gap& gap_m, const Vec3& normal) {
   constexpr double first_m = 1e-6, tolerance_m = 1e-7;  // for other objects that are touched
