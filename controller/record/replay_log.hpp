@@ -82,7 +82,7 @@ class ReplayRecorder {
   bool lost_ = false;
 };
 
-// The path of a file of the record (ReplayHead::cell, scene); refuses paths outside. Throws SetupError.
+// The path of a file of the record (ReplayHead::cell, scene); refuses paths that lead outside. Throws SetupError.
 std::filesystem::path recorded_file(const std::filesystem::path& folder, const char* name);
 // The path of ReplayHead::tool; empty for a point.
 std::filesystem::path recorded_tool(const std::filesystem::path& folder, const ReplayHead& head);

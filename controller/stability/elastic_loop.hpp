@@ -29,7 +29,7 @@
 // average it is half a period behind r, so position and speed disagree, and θ overshoots. With feed-forward the
 // integral part is left out, which changes θ by 1 %.
 //
-// The true gear stiffness may differ from the controller's value: in k but not in k⁻¹ (gear_stiffness_ratio).
+// k is the true gear stiffness, k⁻¹ the controller's value; they may differ (gear_stiffness_ratio).
 //
 // Not modelled: friction in the gears (it helps), backlash, limits, other poses.
 //

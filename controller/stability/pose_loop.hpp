@@ -17,7 +17,7 @@
 // A tool with a shape touches no layers.
 //
 // Each case is judged with drives that lag and with drives that feed forward (elastic_loop.hpp), since the cell doesn't
-// say which it has. For modes of the wrist at 60 to 80 Hz, feed-forward has half as much gain again as a lag.
+// say which it has. For modes of the wrist at 60 to 80 Hz, feed-forward has 1.5 times the gain of a lag.
 // stability.hpp judges masses with both, too.
 //
 // Not modelled: what elastic_loop.hpp leaves out; contacts that come and go.
