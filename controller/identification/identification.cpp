@@ -31,8 +31,8 @@ std::vector<Stand> stands_of(const models::Arm& arm, const std::vector<proof::Re
   return stands;
 }
 
-// How differently the sensor may be tilted in one pose than in another. A tilt common to all poses, such as the twist
-// of an axis that carries the whole arm, is a mounting error of the base.
+// How differently the sensor may be tilted in one pose than in another. A tilt common to all poses, as by the axis that
+// carries the arm, counts as a mounting error of the base.
 class Tilts {
  public:
   Tilts(const description::Cell& cell, const models::Arm& arm, const std::vector<proof::Reading>& readings,

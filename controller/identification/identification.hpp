@@ -1,7 +1,7 @@
 // Identifies the tool behind the sensor from the sensor's readings in several poses of the resting arm.
 //
-// The links' places follow from the motors' angles and the gears' twist, and the twist depends on the unknown tool. So
-// the fit starts with the cell's tool and is repeated with the tool that it found. Allowances for errors:
+// The fit starts with the cell's tool and is repeated with the tool that it found, because the links' places depend on
+// the gears' twist, and this on the tool. Allowances for errors:
 //   mounting   0.5 degrees about each axis, of the sensor on its flange and of the base
 //   drift      the cell's sensor.zero_drift_N from the first pose to the last
 //   gears      a fifth of the twist's change from pose to pose (accuracy of the stiffness); for joints that move also

@@ -7,9 +7,9 @@
 // The forces are fitted first, by Gauss-Newton from m and b alone, since m multiplies ε and δ. Then the torques, linear
 // in c, are fitted with the measured weight, so c doesn't depend on mounting errors.
 //
-// Drift and mounting errors are nuisance parameters with expected value 0 and a given standard deviation (Allowances);
-// each has a row in the least squares. The covariance is the inverse of the normal matrix, times χ²/ν if readings
-// scatter by more than noise and allowances explain.
+// Drift and mounting errors are nuisance parameters, each with expected value 0, a standard deviation (Allowances) and
+// a row in the least squares. The covariance is the inverse normal matrix, times χ²/ν if readings scatter by more than
+// noise and allowances explain.
 //
 // The weight must vary in S by more than five times the mounting error (standard deviations): along one direction for
 // mass and zero to be identifiable, along two for c.

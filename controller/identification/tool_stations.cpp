@@ -39,8 +39,8 @@ Vec3 down_in_sensor(const description::Cell& cell, const models::Arm& arm, const
   return arm.sensor_pose(arm.link_from_motor(motor_rad)).linear().transpose() * down_W;
 }
 
-// How far a joint alone can turn to one side. A drive may deviate by the following error without a fault, so this
-// margin is kept to the ends of ranges.
+// How far a joint alone can turn to one side. A margin of the following error is kept to the ends of ranges, since a
+// drive may deviate by that without a fault.
 double turn_of(const description::Cell& cell, const models::Arm& arm, const JointVector& start, Eigen::Index joint,
                double side) {
   const auto& range = cell.drives[static_cast<std::size_t>(joint)].range_rad;
@@ -73,7 +73,6 @@ std::vector<JointVector> candidates(const description::Cell& cell, const models:
   return poses;
 }
 
-// Scatter of some directions about their mean.
 Mat3 scatter_of(const std::vector<Vec3>& directions) {
   Vec3 sum = Vec3::Zero();
   Mat3 squares = Mat3::Zero();

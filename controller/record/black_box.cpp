@@ -15,7 +15,7 @@ namespace {
 
 // One second more than promised, since a replay starts at a state, and states are a second apart.
 constexpr double kept_s = BlackBox::seconds + 1.0;
-// Below 0.25 ms the number of cycles no longer grows, to bound the memory: the box then holds less time.
+// Below 0.25 ms the box keeps no more cycles, which bounds the memory, and covers less time.
 constexpr double shortest_period_s = 250e-6;
 
 }  // namespace
@@ -44,10 +44,9 @@ BlackBox::BlackBox(double period_s, std::size_t frames_per_cycle, Memory kind)
   }
   void* const memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, flags, descriptor_, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
-  // Populates all pages now; in the cycle this would be a page fault. Each page is written: on processors without dirty
-  // bits (User-Mode Linux, some ARM) the first write to a page of a shared mapping is a fault even after a read.
-  // madvise() does it in one call, since single faults take seconds where each is a process switch (User-Mode Linux);
-  // kernels before 5.14 refuse it.
+  // Populates all pages now, since the cycle may not have page faults: in one call from kernel 5.14 on, because page by
+  // page takes seconds on User-Mode Linux. memset() then writes them: on processors without dirty bits (User-Mode
+  // Linux, some ARM) the first write to a page is a fault even after a read.
   (void)madvise(memory, bytes_, MADV_POPULATE_WRITE);
   std::memset(memory, 0, bytes_);
   Head* const head = new (memory) Head;

@@ -1,7 +1,7 @@
 // Keeps the last ten seconds of a session in memory: the cycle's input and output, and the controller's state.
 //
 // The cycle writes here (noexcept, no lock, no allocation, no system call; every page is touched beforehand). The
-// memory is a shared mapping. So a process forked earlier still has it after this process has died
+// memory is a shared mapping: a process forked earlier keeps it when this process dies
 // (command_line/black_box_keeper.hpp), and a process that gets the descriptor can read it (MappedBox). Four rings,
 // overwritten from their oldest end:
 //   cycles   one entry per cycle: its input beside frames, and the cycle's record
@@ -41,7 +41,6 @@ struct BusInput {
   std::uint64_t receive_overflows = 0;
 };
 
-// The input of one cycle, and its record.
 struct BoxCycle {
   std::int64_t t_k_ns = 0;
   std::uint64_t first_frame = 0;  // in the ring of frames, counted from the first cycle

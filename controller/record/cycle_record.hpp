@@ -98,14 +98,14 @@ struct RecordedContact {
   Triple normal_W{};      // unit, out of the object; zero: no contact
   Triple force_W_N{};     // on the tool
 };
-// A box has four corners on a table, and eight in a groove. For a tool, the strongest contacts are recorded, strongest
-// first; for a point, the order is the scene's.
+// Enough for a box on a table (four corners) or in a groove (eight). A tool's contacts are the strongest, strongest
+// first; a point's are in the scene's order.
 inline constexpr std::size_t most_contacts = 8;
 
 struct CycleRecord {
   std::uint64_t cycle = 0;     // k
   std::int64_t time_ns = 0;    // t_k, as scheduled, from the first cycle of the session
-  std::int64_t period_ns = 0;  // t_k as scheduled, since the session's first cycle
+  std::int64_t period_ns = 0;  // T, from this cycle to the next one
   Phase phase = Phase::idle;
   ContactPhase contact = ContactPhase::free;
   std::uint8_t contact_count = 0;  // number of simultaneous contacts, may exceed most_contacts

@@ -14,7 +14,6 @@ struct FlagWords {
   bool holds_back;  // an active limit
 };
 [[nodiscard]] const std::vector<FlagWords>& flag_words();
-// The words of one flag.
 [[nodiscard]] const char* words_of(RecordFlag flag) noexcept;
 
 }  // namespace proxarm::controller

@@ -1,7 +1,7 @@
 // Passes another network's traffic through unchanged, and copies every frame to a ring.
 //
-// For records of runs on real interfaces, where nothing else sees all frames. Sent frames have the time of send(), or
-// the time given to send_all(). This precedes the time on the wire by the wait in the interface's queue and on the bus.
+// For records on real interfaces, where nothing else sees all frames. Sent frames have the time of send(), or the time
+// given to send_all(): earlier than on the wire, by the wait in the interface's queue and on the bus.
 #pragma once
 
 #include <cstdint>

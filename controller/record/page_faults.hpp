@@ -16,7 +16,7 @@ struct PageFaults {
   }
 };
 
-// The calling thread's counts so far; a system call.
+// A system call.
 inline PageFaults thread_page_faults() noexcept {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);

@@ -254,7 +254,6 @@ bool ReplayReader::read_block() {
   return true;
 }
 
-// Reads the entry of the next cycle; false if there is none.
 bool ReplayReader::read_cycle() {
   if (at_ == block_.size() && !read_block()) return false;
   std::uint32_t bytes = 0;

@@ -93,8 +93,8 @@ class ReplayReader {
   explicit ReplayReader(const std::filesystem::path& file);
   [[nodiscard]] const ReplayHead& head() const noexcept { return head_; }
   [[nodiscard]] const std::vector<std::byte>& state() const noexcept { return state_; }
-  // Returns false at the end. The record holds only the cycle's number and setpoints. An incomplete last entry counts
-  // as the end, since a crash may cut it off.
+  // Returns false at the end. The record holds only the cycle's number and setpoints. An incomplete last entry, as
+  // after a crash, counts as the end.
   bool next(BoxCycle& cycle, std::vector<BoxFrame>& frames);
   // The position of the entry that next() reads; go_to() returns there.
   [[nodiscard]] ReplayPlace position() const noexcept;
@@ -124,7 +124,6 @@ class ReplayNetwork final : public fieldbus::CanNetwork {
   explicit ReplayNetwork(const ReplayHead& head);
   ~ReplayNetwork() override;
 
-  // Sets the frames that the next cycle receives.
   void load(const BoxCycle& cycle, const std::vector<BoxFrame>& frames);
 
   [[nodiscard]] std::size_t bus_count() const noexcept override;

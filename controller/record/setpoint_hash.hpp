@@ -1,5 +1,5 @@
-// A hash of all setpoints: SHA-256 over int32 little-endian counts in axis order, cycle after cycle. Two runs with the
-// same setpoints have the same hash.
+// SHA-256 of all setpoints, as int32 little-endian counts in axis order, cycle after cycle. Runs with the same
+// setpoints have the same hash.
 //
 // Not for the cycle; the reader of the records feeds it.
 #pragma once

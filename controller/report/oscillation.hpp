@@ -1,5 +1,6 @@
 // Finds the longest spell in which the arm swung by itself, with its frequency and amplitude, for the summary's
 // verdict.
+//
 // PassivityObserver (controller/stability/passivity.hpp) reports in each cycle whether the tool oscillates and whether
 // that lasts. Oscillating cycles form one spell if pauses between them are shorter than `pause_s`, since a wall
 // interrupts it in every period. A blow is a spell of some 0.1 to 0.3 s, the ringing after it one of up to

@@ -1,10 +1,10 @@
 // Draws a session as a picture (SVG, by gnuplot): positions of tool and proxy, forces, contact phases as bands.
 //
-// With a contact, positions are split along the first contact's normal and the direction in which the proxy slid
-// farthest; the surface is at 0. Without one, the panels show x, y and z. For a tool that turns, two more panels show
-// the rotation since the start and the torques about the rendered point, both about the axis of the proxy's widest
-// turn. Only Phase::rendering is drawn. Long sessions are thinned out to some thousand points, so memory is bounded.
-// Curves differ in dash and width as well as in colour, sticking and slipping in shade and label.
+// With a contact, positions are along the first contact's normal and the direction in which the proxy slid farthest;
+// the surface is at 0. Without one, the panels show x, y and z. For a tool that turns, two more panels show rotations
+// since the start and torques about the rendered point, along the axis of the proxy's widest turn. Only
+// Phase::rendering is drawn. Long sessions are thinned out to some thousand points, so memory is bounded. Curves differ
+// in dash and width as well as in colour, sticking and slipping in shade and label.
 //
 // Without gnuplot there is a warning instead of a picture. gnuplot is started without a shell, in a temporary folder,
 // and its script quotes all paths and names from outside. Not for the cycle.

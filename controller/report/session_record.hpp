@@ -37,11 +37,10 @@ namespace proxarm::controller {
 
 class SessionWriter {
  public:
-  // Makes the folder, with parents. An existing folder must be empty or hold an earlier session, which is replaced.
-  // Throws description::SetupError with key --record if the folder holds anything else, can't be written, or another
-  // session writes to it. The folder is locked (flock) as long as the writer lives, and any process forked meanwhile.
-  // `axis_names`: for the drives' columns, at most max_axes. `with_truth`: adds the columns of the simulation's true
-  // state.
+  // Makes the folder, with parents, or replaces an earlier session in it. Throws description::SetupError with key
+  // --record if the folder holds anything else, can't be written, or another session writes to it. The folder is locked
+  // (flock) while the writer or a process forked meanwhile lives. `axis_names`: for the drives' columns, at most
+  // max_axes. `with_truth`: adds the columns of the simulation's true state.
   SessionWriter(const std::filesystem::path& folder, const std::vector<std::string>& axis_names, bool with_truth,
                 SignalsForm form = SignalsForm::csv);
 

@@ -1,8 +1,7 @@
 // The figures of a session: what was rendered, how accurately, and how fast it was computed.
 //
-// SummaryBuilder gets every cycle's record once, in order, and stores little; finish() returns the figures. Not for the
-// cycle. Unless stated otherwise, a figure is over cycles of Phase::rendering. A figure without data is absent (null in
-// JSON).
+// SummaryBuilder gets every cycle's record once, in order, and stores little. Not for the cycle. Unless stated
+// otherwise, a figure is over cycles of Phase::rendering. A figure without data is absent (null in JSON).
 //
 // "Hand's force" F_h and "tool" x are the simulation's true values if the records hold them. Otherwise F_h is the
 // compensated measured force plus the handle's inertia (the sensor sits before the handle and doesn't see it), and x

@@ -39,7 +39,6 @@ fieldbus::DriveSettings drive_settings(const description::Cell& cell, const Sess
   return drive;
 }
 
-// Each bus with drives, once.
 std::vector<DriveBus> drive_buses(const std::vector<fieldbus::DriveSlot>& drives) {
   std::vector<DriveBus> buses;
   for (const fieldbus::DriveSlot& slot : drives) {
@@ -60,9 +59,9 @@ struct Drives {
   std::vector<fieldbus::ModbusDrive*> modbus;
 };
 
-// 6065h and 6066h: the drive itself judges its following error, a little later than the controller does
-// (drive_monitor.hpp). The window is the lag at the highest speed plus the deviation that is a fault at once. The time
-// is what the setpoint of a joint that jams at that speed takes to brake and return.
+// 6065h and 6066h: the drive judges its following error a little later than the controller does (drive_monitor.hpp).
+// Window: the lag at the highest speed plus the deviation that is a fault at once. Time: what the setpoint of a joint
+// that jams at that speed takes to brake and return.
 void watch_following(fieldbus::DriveSettings& settings, const description::DriveDescription& drive,
                      double following_error_rad) {
   const double v = drive.max_speed_rad_per_s, a = drive.max_acceleration_rad_per_s2;
@@ -108,7 +107,7 @@ Drives make_drives(const description::Cell& cell, const SessionSettings& setting
 
 struct Sensor {
   std::unique_ptr<fieldbus::ForceSensor> owned;
-  fieldbus::ModbusSensor* on_line = nullptr;  // owned, or null if the sensor is on a CAN bus
+  fieldbus::ModbusSensor* on_line = nullptr;  // `owned` itself, or null for a sensor on a CAN bus
 };
 
 Sensor build_sensor(const description::Cell& cell, const description::SensorDescription& sensor) {
@@ -137,8 +136,7 @@ Sensor build_sensor(const description::Cell& cell, const description::SensorDesc
   return {std::make_unique<fieldbus::DescribedSensor>(sensor, settings)};
 }
 
-// One worker and one connection per line. A TCP drive has its own address and so its own line; units behind a gateway
-// share one.
+// One worker and one connection per line. Each TCP drive has its own line; units behind a gateway share one.
 std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const description::Cell& cell,
                                                                 const std::vector<fieldbus::ModbusDrive*>& drives,
                                                                 fieldbus::ModbusSensor* sensor,

@@ -58,9 +58,9 @@ using Identities = std::vector<std::string>;
 // Starts a Modbus line's worker: a thread, or its substitute in a simulation.
 using LineStarter = std::function<void(fieldbus::ModbusLine&)>;
 
-// NMT; SDO configuration written and read back; sensor calibration read. Drives end in NMT operational, not enabled.
-// Modbus lines keep running, with their rates measured for 0.25 s. `tell` receives what else the drives needed, such as
-// a reset of an old error.
+// NMT, SDO configuration with reading back, sensor calibration. Drives end in NMT operational, not enabled. Modbus
+// lines keep running, with their rates measured for 0.25 s. `tell` receives other actions, such as a reset of an old
+// error.
 Identities bring_up(
     CycleParts& parts, const LineStarter& start_line = [](fieldbus::ModbusLine& line) { line.start(); },
     const fieldbus::Tell& tell = {});

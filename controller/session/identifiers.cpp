@@ -17,7 +17,6 @@ using description::Cell;
 using description::SensorDescription;
 using description::SetupError;
 
-// An identifier on an interface, and its owner.
 struct Use {
   std::size_t interface = 0;
   std::uint32_t id = 0;

@@ -8,8 +8,8 @@
 namespace proxarm::controller {
 
 // Throws SetupError with the cell's file, line and key if the cell's choices for the sensor are invalid, or if sensor
-// or enabling input share an identifier on one bus with the controller, a drive or each other. Drives' identifiers
-// follow from their nodes. `bus_indices` tells which of the cell's buses share an interface.
+// or enabling input share an identifier on one bus with the controller, a drive or each other. `bus_indices` tells
+// which of the cell's buses share an interface.
 void require_own_identifiers(const description::Cell& cell, const description::SensorDescription& sensor,
                              const SessionSettings& settings, const BusIndices& bus_indices);
 

@@ -6,8 +6,8 @@
 
 namespace proxarm::controller {
 
-// A scene without anything to touch becomes the line or plane that the arm's tool can reach, if the arm can't move in
-// all directions. Any other scene is returned unchanged.
+// An empty scene becomes the line or plane that the tool can reach, if the arm can't move in all directions. Any other
+// scene is returned unchanged.
 scenes::Scene reachable_scene(scenes::Scene scene, const description::Cell& cell);
 
 }  // namespace proxarm::controller

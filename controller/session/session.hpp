@@ -1,10 +1,9 @@
 // The loop around the cycle: wakes at t_k, runs the cycle, handles lateness, ends after the stop.
 //
-// On time: t_{k+1} = t_k + T. A cycle that ends after the next t_k is an overrun. The periods that it missed are
-// skipped, never caught up in a burst; the drives see a longer step instead. Periods that the process slept through
-// (suspended) are skipped, too. Late and skipped cycles in a row are counted together: Fault::overrun. Simulated time
-// at the pace of the clock waits up to 0.2 s for late cycles (SimulatedCanNetwork): they count as overruns, but none is
-// skipped and no fault is raised.
+// t_{k+1} = t_k + T. A cycle that ends after the next t_k is an overrun: the missed periods are skipped, never caught
+// up in a burst, and the drives see a longer step. Periods that a suspended process sleeps through are skipped, too.
+// Late and skipped cycles in a row raise Fault::overrun. Simulated time at the pace of the clock waits up to 0.2 s for
+// a late cycle (SimulatedCanNetwork): this counts as an overrun, but nothing is skipped and no fault is raised.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +21,6 @@ struct SessionHooks {
                                                           // thread
 };
 
-// Why a session ended.
 enum class SessionEnd : std::uint8_t {
   duration,         // the wanted rendering time is over
   asked,            // request_stop() from outside the loop: a signal
@@ -31,7 +29,6 @@ enum class SessionEnd : std::uint8_t {
   fault,            // the supervisor's report says which
 };
 
-// How long a session lasts.
 struct SessionLength {
   double duration_s;  // of rendering
   // The longest release (Phase::freeing) once the script has no order left, s. Only an order or the enabling input ends

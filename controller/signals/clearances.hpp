@@ -10,10 +10,10 @@
 
 namespace proxarm::controller {
 
-// Sets both clearances of a record at this time of rendering. The tool's place is the simulation's true one if
-// recorded, else by the encoders. A point's contacts get their places, forces (place_contacts()) and gaps. In an
-// elastic layer the gap is measured from its surface, so it is below 0. The gap of a driven object stays 0, since the
-// scene's file doesn't say where it is. Precondition: `clearances` belong to `scene`.
+// Sets both clearances of a record at this time of rendering, and the places, forces (place_contacts()) and gaps of a
+// point's contacts. The tool's place is the simulation's true one if recorded, else by the encoders. Gaps are below 0
+// in an elastic layer; a driven object's gap stays 0, since the scene's file doesn't say where it is. Precondition:
+// `clearances` belong to `scene`.
 void add_clearances(CycleRecord& record, const scenes::Scene& scene, const scenes::Clearances& clearances,
                     std::int64_t rendered_ns);
 

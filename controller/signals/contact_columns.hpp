@@ -11,7 +11,7 @@ namespace proxarm::controller {
 
 [[nodiscard]] const std::vector<SignalColumn>& contact_columns();
 
-// The contact's torque about the rendered point, in W, Nm.
+// About the rendered point.
 [[nodiscard]] Triple contact_torque_W_Nm(const CycleRecord& record, const RecordedContact& contact) noexcept;
 
 // Appends one contact's row as text, without its end. Precondition: index < record.recorded_contacts().

@@ -167,7 +167,6 @@ void add_more(Columns& columns, const std::vector<std::string>& axis_names, bool
   columns.add_vector("true_acceleration_W", "m/s²", "W", "of the simulated tool");
 }
 
-// Columns for tools that turn.
 void add_turning(Columns& columns, bool with_truth) {
   columns.add_orientation("proxy_W", "orientation of the proxy");
   columns.add_vector("contact_torque_W", "Nm", "W", "the world's torque on the proxy, about the rendered point");

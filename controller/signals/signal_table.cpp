@@ -58,7 +58,6 @@ std::vector<std::string> parted(std::string_view text) {
   return words;
 }
 
-// Everything before the first block.
 std::string table_head(const std::vector<SignalColumn>& columns, std::uint32_t version) {
   Json list = Json::array();
   for (const SignalColumn& column : columns) {
@@ -221,7 +220,7 @@ void SignalTable::read_columns() {
   }
 }
 
-// Finds the complete blocks.
+// Only complete blocks.
 void SignalTable::find_blocks() {
   const std::size_t plain_bytes = columns_.size() * block_rows_ * sizeof(double);
   for (std::size_t at = first_block_; at < bytes_;) {

@@ -92,7 +92,6 @@ class TextRow {
   bool first_ = true;
 };
 
-// Writes the same values as numbers.
 class NumberRow {
  public:
   NumberRow(double* first, std::size_t apart) noexcept : at_(first), apart_(apart) {}
@@ -121,7 +120,6 @@ void put_all(auto& row, const auto& values) {
   for (const double value : values) row.number(value);
 }
 
-// Adds columns one after the other.
 class Columns {
  public:
   void add(std::string name, std::string unit, std::string frame, std::string meaning,

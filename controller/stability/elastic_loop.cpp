@@ -155,7 +155,6 @@ bool are_near(const models::ToolPose& a, const models::ToolPose& b) noexcept {
 
 namespace {
 
-// Leads an arm from its start pose.
 class LedArm {
  public:
   explicit LedArm(const models::Arm& arm)  // throws for an arm that can't move the tool

@@ -9,7 +9,7 @@
 //   φ = φ₁ + T φ̇₁ + ¼T²(φ̈₁ + φ̈),   φ̇ = φ̇₁ + ½T(φ̈₁ + φ̈)
 //   (M − Jᵀ M_h J + ½T d + ¼T² k) φ̈ = k(y − φ₁ − Tφ̇₁ − ¼T²φ̈₁) + d(ẏ − φ̇₁ − ½Tφ̈₁) + Jᵀ w
 // The encoders alone aren't enough: near an arm's first mode the links move several times as far as the motors, and out
-// of phase. At 16 Hz the default cell gave a hand 0.4 W while its motors seemed to take 0.1 W.
+// of phase.
 //
 // A force reading of age τ belongs to the motors' angles τ ago, so y is delayed by τ (delay.hpp). The result is the
 // links' motion at the time of the force.

@@ -1,7 +1,6 @@
-// Judges during a session whether the felt mass and inertia are stable in the poses that the arm passes. Before a
-// session only the start pose is checked, but the arm's modes change with the pose: over 0.3 m the default cell's
-// smallest stable mass changes by a third, and the inertia of a tool that is led and turned at once (pose_loop.hpp) by
-// far more.
+// Judges during a session whether the felt mass and inertia are stable in the poses that the arm passes, since modes
+// change with the pose: over 0.3 m the default cell's smallest stable mass changes by a third, and the inertia of a
+// tool that is led and turned at once (pose_loop.hpp) by far more. Before a session only the start pose is checked.
 //
 // A place is judged if the tool is at least 50 mm or 0.1 rad (are_near()) from all places judged before with the same
 // proxy. judge() never runs in the cycle: it takes some milliseconds, with a tool that turns some forty, and half a
@@ -31,7 +30,6 @@ class PassedPoses {
     bool operator==(const Felt&) const = default;
   };
 
-  // A place to be judged.
   struct Asked {
     double time_s = 0.0;
     Felt felt;
@@ -60,9 +58,9 @@ class PassedPoses {
     if (!is_new(tool_W, felt)) return {};
     return Asked{time_s, felt, loop_, joints_rad()};
   }
-  // Judges a place. Returns the unstable places if they should be reported: none was reported yet for this mass and
-  // inertia, or this one requires half as much again. May run on another thread, one call at a time, while come_to()
-  // goes on; the functions below then belong to that thread as well.
+  // Judges a place. Returns the unstable places to report: if none was reported yet for this mass and inertia, or this
+  // one requires half as much again. May run on another thread, one call at a time, while come_to() goes on; the
+  // functions below then belong to that thread.
   std::optional<UnstablePlaces> judge(const Asked& asked);
 
   // From now on also finds the smallest stable mass in stable places, which takes ten times as long as judging. The

@@ -8,10 +8,10 @@
 // The equation of motion times T v(k) is the proxy's energy balance, exact up to rounding. At order 1, where v =
 // ∇q(k)/T, with (a − b)·a = ½(a² − b² + (a − b)²):
 //   T (h + f)·v = Δ(½M v²) + T B v² + Δ(½K_v (q − q_ref)²) + ½M(∇v)² + ½K_v(∇q)²
-// The last two terms are the step's own loss, so the integration never generates energy. At order 2 the same holds with
-// the h, B and K_v that it weights over its steps. If the world generates energy (moving objects; curved surfaces, on
-// which (26) isn't neutral), W_w > 0. W_p − W_h is the energy that delay, drives and arm add between the two ports. For
-// a force that accelerates M at the frequency ω, and a motion that lags by L, the hand feels the damping
+// The last two terms are the step's own loss, so the integration never generates energy; at order 2 the same holds with
+// its weighted h, B and K_v. W_w > 0 if the world generates energy: moving objects, or curved surfaces, on which (26)
+// isn't neutral. W_p − W_h is the energy that delay, drives and arm add. For a force that accelerates M at the
+// frequency ω, and a motion that lags by L, the hand feels the damping
 //   b(ω) = B cos ωL − M ω sin ωL,
 // which is negative at every frequency where B < M ω tan ωL. The hand's own damping must outweigh it, or the loop
 // oscillates.
@@ -19,9 +19,8 @@
 // A force reading of age τ belongs to the motion τ ago. At 3 Hz and 50 ms the two are 54° apart, which would confuse
 // who shakes whom. So the motion is delayed by τ, too (delay.hpp); below, x is the delayed motion.
 //
-// Oscillation is judged at the hand's port, above the band of deliberate hand motion (low_Hz). The same filter selects
-// this band of force and motion, which keeps the phase between them (band.hpp). Averages are over average_s, and ẋ is
-// the speed after the filter's low-pass:
+// Oscillation is judged at the hand's port, above the band of deliberate hand motion (low_Hz), with one filter for
+// force and motion (band.hpp). Averages are over average_s, and ẋ is the speed after the filter's low-pass:
 //   P̂ = ⟨h̃·ẋ̃⟩,   b̂ = P̂/⟨ẋ̃²⟩        power that the hand gives, and damping that it feels, in the band
 //   E(k) = min(E(k−1) + T(P̂ + refill_W), tank_J)       the balance; E(0) = tank_J, E ≥ −tank_J
 // The device oscillates while E is negative, P̂ < −refill_W, and the band holds more than a share of ⟨ẋ²⟩. The tank is
@@ -40,10 +39,10 @@
 //   P̂ = ⟨h̃·ẋ̃ + τ̃·ω̃⟩,   and ⟨ẋ̃² + ρ²ω̃²⟩, ⟨x̃² + ρ²φ̃²⟩, ⟨h̃² + τ̃²/g²⟩ in place of ⟨ẋ̃²⟩, ⟨x̃²⟩, ⟨h̃²⟩
 // Position and rotation exchange energy, so neither alone shows who gives. A torque counts as two forces on the ends of
 // a grip of breadth g. The added damping acts on the position as B_a and on the rotation as ρ²B_a, so both decay at the
-// rate B_a/M. The motion is observed twice: by the links of the arm's model (link_motion.hpp), and by the motors. The
-// tool oscillates if either view says so, and b̂ is the smaller one. Near the arm's first mode the motors' phase is
-// wrong; the links' phase is wrong if the gears' true stiffness differs from the model's. Energies, ⟨x̃²⟩ and frequency
-// are the links'.
+// rate B_a/M. The motion is observed by the links of the arm's model (link_motion.hpp) and by the motors. The tool
+// oscillates if either view says so, and b̂ is the smaller one: near the arm's first mode the motors' phase is wrong,
+// and the links' phase if the gears' true stiffness differs from the model's. Energies, ⟨x̃²⟩ and frequency are the
+// links'.
 //
 // For a tool that doesn't turn, the motion comes from the encoders, which don't see the gears' twist. If the hand's
 // mass oscillates on the gears, the links move far more than the motors, and P̂ doesn't show it. So the device also

@@ -48,8 +48,7 @@ models::Mat3 beside(const Vec3& n) {
   return directions;
 }
 
-// Loops with drives that lag and with drives that feed forward; which kind the cell has isn't known. Without a time
-// constant both are the same.
+// Loops with both kinds of drive, since the cell doesn't say which it has. Without a time constant both are the same.
 std::vector<ElasticLoop> with_both_drives(const ElasticArm& arm, const PoseLoopModel& model) {
   const Grip grip = grip_of(model);
   LoopModel loop = model.loop;

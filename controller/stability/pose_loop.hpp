@@ -16,9 +16,9 @@
 // For a point tool that presses on elastic layers (loop.layers), their springs are added to K_v, sliding and sticking.
 // A tool with a shape touches no layers.
 //
-// Each case is judged with drives that lag and with drives that feed forward (elastic_loop.hpp), since the cell doesn't
-// say which it has. For modes of the wrist at 60 to 80 Hz, feed-forward has 1.5 times the gain of a lag.
-// stability.hpp judges masses with both, too.
+// Each case, like the masses of stability.hpp, is judged with drives that lag and with drives that feed forward
+// (elastic_loop.hpp), since the cell doesn't say which it has. For modes of the wrist at 60 to 80 Hz, feed-forward has
+// 1.5 times the gain of a lag.
 //
 // Not modelled: what elastic_loop.hpp leaves out; contacts that come and go.
 //
@@ -83,9 +83,9 @@ class PoseLoop {
   double period_s_;
 };
 
-// Builds the loop with the arm in this pose. The touched places of `model` are from T in T's axes. The cell determines
-// what hangs behind the sensor. The horizon and order of `model.loop` are ignored: only positions are predicted, and
-// rotation and contacts are computed with order 1.
+// Builds the loop with the arm in this pose. The touched places of `model` are from T in T's axes; its behind_sensor_W
+// is replaced by the cell's. Horizon and order of `model.loop` are ignored: only positions are predicted, and rotation
+// and contacts are computed with order 1.
 PoseLoop pose_loop_at(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell,
                       PoseLoopModel model);
 

@@ -30,7 +30,6 @@ struct SpellConfig {
   double pause_s = 0.25;
 };
 
-// The observed swing in one cycle.
 struct SeenSwing {
   bool oscillates = false;
   double square_m2 = 0.0;               // ⟨x̃²⟩

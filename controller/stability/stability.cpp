@@ -199,9 +199,8 @@ bool damps_gears(const LoopModel& loop) {
 // A horizon is chosen and judged with drives that lag, since lookahead compensates for lags.
 enum class Drives { lag, both };
 
-// With torque-damped gears a loop must also hold with each of these errors: the damping makes a mass stable, so it is
-// only as good as its measurement. Torques a fifth too small are less critical than soft gears. Soft gears require the
-// most, so they come first.
+// With torque-damped gears a loop must hold with each of these errors, too, since its stability rests on that
+// measurement. Soft gears come first: they require the most. Torques a fifth too small are less critical.
 std::vector<LoopModel> with_torque_errors(const LoopModel& loop) {
   if (!damps_gears(loop)) return {loop};
   LoopModel soft = loop, late = loop;
@@ -217,8 +216,7 @@ LoopModel feeding_forward(LoopModel loop) {
   return loop;
 }
 
-// The loops in all poses, free and on all layers, with drives that lag and with drives that feed forward: the cell
-// doesn't say which it has.
+// The loops in all poses, free and on all layers, with both kinds of drive: the cell doesn't say which it has.
 class ElasticLoops {
  public:
   ElasticLoops(const HandModel& hand, const LoopModel& loop, Drives drives = Drives::both)

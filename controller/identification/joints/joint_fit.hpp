@@ -9,18 +9,18 @@
 //   M  kg m², links and tool   τ_g  Nm, gravity
 //
 // Gears come first. The drives control the motors, so θ is known independently of friction, and the sensor reads how
-// the tool swings: link_response.hpp, fast motions, all joints at once. Unknown are ln k, ln d, the sensor's delay and
-// its scale. The response isn't convex in k, so each k is first tried from a third to three times the cell's value.
-// Then (1) is fitted for each joint to the lines of both motions: linear in J, F, b and in the delay δ of 6077h, τ(t) ≈
-// τ_read + δ dτ_read/dt. The fast motion has its own friction, since it reaches lower speeds.
+// the tool swings (link_response.hpp; fast motions of all joints). Unknown are ln k, ln d, the sensor's delay and
+// scale. The response isn't convex in k, so each k is first tried from a third to three times the cell's value. Then
+// (1) is fitted for each joint to the lines of both motions: linear in J, F, b and the delay δ of 6077h, τ(t) ≈ τ_read
+// + δ dτ_read/dt. The fast motion has its own friction, since it reaches lower speeds.
 //
-// A drive reads its torque once a cycle T, where two setpoints meet. A drive that moves straight between setpoints,
-// with a position loop of bandwidth f_p, reads less there than the mean, by (2π f_p T)²/12 of J θ̈. A drive that moves
-// on a curve, or filters its reading, doesn't. So J has this standard deviation.
+// A drive reads its torque once a cycle T, where two setpoints meet. If it moves straight between setpoints, with a
+// position loop of bandwidth f_p, it reads less there than the mean, by (2π f_p T)²/12 of J θ̈; otherwise not. So J has
+// this standard deviation.
 //
-// Quantities that aren't measured have allowances (Allowed): link inertias that differ from the URDF's, a wrong scale
-// of the drive's torque, a tilted sensor. The interval covers these and the noise. A value is not identifiable if it is
-// known at best to half of itself.
+// Allowances (Allowed) cover what isn't measured: link inertias that differ from the URDF's, a wrong scale of the
+// drive's torque, a tilted sensor. The interval includes these and the noise. A value known at best to half of itself
+// is not identifiable.
 #pragma once
 
 #include <string>

@@ -7,9 +7,9 @@
 // ramps fade both motions in and out. Recording starts one period after the ramp, when the arm swings steadily, and
 // covers whole periods: the lines have no leakage, and differences between periods are noise.
 //
-// A and a are as large as these bounds allow: 0.1 rad; per line 3 % of the drive's acceleration; for the tool 0.06 m/s
-// (slow) and 0.25 m/s² per line (fast); a fifth of the joint's speed; a fifth of its drive's torque; half of the way to
-// the end of its range. workspace_m and keep_out_m hold throughout each motion.
+// A and a are as large as these bounds allow: 0.1 rad; 3 % of the drive's acceleration per line; 0.06 m/s (slow) and
+// 0.25 m/s² per line (fast) of the tool; a fifth of the joint's speed and of its drive's torque; half of the way to the
+// end of its range; workspace_m and keep_out_m.
 #pragma once
 
 #include <Eigen/Core>
@@ -56,7 +56,6 @@ std::vector<int> fast_lines(int rows_per_period, double cycle_s);
 std::vector<JointMotion> joint_motions(const description::Cell& cell, const models::Arm& arm,
                                        const models::JointVector& motor_rad, double cycle_s);
 
-// Describes the motions, one line per joint.
 std::string text(const std::vector<JointMotion>& motions, const models::Arm& arm, double cycle_s);
 
 class JointExercise final : public proof::Exercise {

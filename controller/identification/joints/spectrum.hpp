@@ -17,7 +17,6 @@ struct Spectrum {
 // five neighbours in `lines` on each side, since few periods don't suffice for a single line.
 Spectrum spectrum(const Eigen::MatrixXd& record, int rows, const std::vector<int>& lines);
 
-// The mean over all periods.
 Eigen::MatrixXd mean_period(const Eigen::MatrixXd& record, int rows);
 
 }  // namespace proxarm::identification
