@@ -3,8 +3,7 @@
 //
 // PassivityObserver (controller/stability/passivity.hpp) reports in each cycle whether the tool oscillates and whether
 // that lasts. Oscillating cycles form one spell if pauses between them are shorter than `pause_s`, since a wall
-// interrupts it in every period. A blow is a spell of some 0.1 to 0.3 s, the ringing after it one of up to
-// 1.4 s.
+// interrupts it in every period. A blow is a spell of some 0.1 to 0.3 s, the ringing after it one of up to 1.4 s.
 //
 // Position and velocity of the spell pass through a high-pass H of n = 5 equal stages (fc = 4 Hz, which leaves 0.02 of
 // 2 Hz); ⟨z²⟩ and ⟨ż²⟩ are their mean squares. A sinusoid of amplitude A and frequency ω has
