@@ -1,4 +1,4 @@
-// What options take, checked while the command line is parsed, so that CLI11 names the option in its message.
+// Parsers of option values. They run while CLI11 parses the command line, so that its messages name the option.
 #pragma once
 
 #include <CLI/CLI.hpp>
