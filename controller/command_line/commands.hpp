@@ -19,7 +19,7 @@ struct FileOptions {
 
 struct CheckFilesOptions {
   std::vector<std::filesystem::path> files;
-  std::filesystem::path scene;  // cells are checked together with it; empty: the cells' default scenes
+  std::filesystem::path scene;  // cells are checked with it; empty: with their default scenes
   scenes::CheckOptions states;  // how scenes are tried
 };
 

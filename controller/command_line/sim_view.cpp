@@ -5,7 +5,7 @@ namespace {
 
 constexpr std::int64_t period_ns = 1'000'000;
 
-// Returns the phase of a session in which as many drives are powered.
+// Returns the session phase that fits the number of powered drives.
 controller::Phase phase_of(const sim::Plant& plant) noexcept {
   std::size_t powered = 0;
   for (std::size_t axis = 0; axis < plant.axis_count(); ++axis) powered += plant.servo(axis).powered() ? 1 : 0;

@@ -1,15 +1,13 @@
 // Measures what a hand feels at the handle of the simulated arm from 0.1 to 30 Hz: the impedance F/v in free motion and
 // against a wall, and τ/ω for a tool that turns.
 //
-// The hand's intended motion is a sum of sines. The hand's force on the handle and the tool's true position are sampled
-// once a cycle over whole periods of all sines, so one Fourier coefficient per sine is exact. In free motion
+// The hand's intended motion is a sum of sines. Its force on the handle and the tool's true position are sampled once a
+// cycle over whole periods of all sines, so one Fourier coefficient per sine is exact. In free motion
 //   F/a = M_apparent(f) is complex: its real part is the felt mass, its imaginary part −B/ω;
 // apparent_mass_error is |F/a − M|/M. An arm feels different in different directions, so free motion is measured along
-// x, y and z of W, in a session each, and the worst one counts. Against a wall, along x, F/x is the felt stiffness.
-// Both together span the impedances that can be rendered at a frequency (the Z-width). For rotation, torque, turn and
-// inertia take the places of force, position and mass.
-//
-// The caller provides the arm, so the studies don't depend on buses or drives.
+// x, y and z of W, and the worst one counts. Against a wall, along x, F/x is the felt stiffness. Both together span the
+// impedances that can be rendered at a frequency (the Z-width). For rotation, torque, turn and inertia replace force,
+// position and mass. The caller provides the arm.
 #pragma once
 
 #include <functional>

@@ -46,7 +46,7 @@ double step_ns(models::GeometricAlgorithm<3>& g, const Vec3& at, const Vec3& pus
       q = g(coupling_N_per_m, q + ahead + push, q);
     }
     best = std::min(best, elapsed_ns(begun) / steps);
-    // Free space: only there does the push lead 5 µm further down in each step.
+    // In free space the push moves the proxy 5 µm further down in each step.
     const bool fell = push.z() < 0.0 && at.z() - q.z() > 0.5 * steps * std::abs(push.z());
     if (!q.allFinite() || fell) return not_measured;
   }

@@ -1,11 +1,9 @@
 // Measures the cost of a step and of start-up against the size of a world: distant objects must cost nothing.
 //
 // The worlds have one to thousands of spheres on a grid, or meshes of up to a hundred thousand triangles. The proxy is
-// far from all objects, near one, or slides on one; the cost is compared with evaluating every object in every step.
-// The study also measures the cost of each option of a scene in use. Unused options must cost nothing, since 𝒢 is
-// compiled without them. For whole cycles it counts what they compute around 𝒢, and how often they skip it.
-//
-// The caller provides the cycles, so the studies don't depend on an arm.
+// far from all objects, near one, or slides on one; evaluating every object in every step is the comparison. The study
+// also measures each option of a scene; unused options cost nothing, since 𝒢 is compiled without them. For whole cycles
+// it counts what they compute around 𝒢 and how often they skip it. The caller provides the cycles.
 #pragma once
 
 #include <cstdint>

@@ -1,17 +1,16 @@
-// Maps the smallest stable mass over timestep, hand, delay and drive. It is predicted from eigenvalues
+// Maps the smallest stable mass over timestep, hand, delay and drive: predicted from eigenvalues
 // (controller/stability/stability.hpp), and measured by running the controller's own proxy against the same linear
-// plant until the motion has grown or decayed.
+// plant.
 //
 // In free motion, the rate of growth or decay is measured once only the slowest mode is left; bisection finds the mass
 // at which it is 0. A point is ill-conditioned if 1 % of the hand's stiffness moves the boundary by 3 % or more (|∂ln
 // M/∂ln K_h| ≥ 3).
 //
-// At every tenth point the proxy also meets a wall while the hand pushes on. It may settle, bounce for ever, or
-// diverge. Order 2 steps by (26) at contacts, so the larger of the two stable masses counts there. Eigenvalues don't
-// include impacts: the hand's mass m_h answers an impact with a pulse of size m_h/M, which returns after the loop's
-// delay. With m_h/M near 1, the next impact adds to the rest of that pulse. So simulation finds the multiple of the
-// smallest mass above which no bouncing grows. A mass counts as stable at walls from `wall_margin` times the smallest
-// mass on.
+// At every tenth point the hand also pushes the proxy against a wall, where it may settle, bounce for ever, or diverge.
+// Order 2 steps by (26) at contacts, so the larger of the two stable masses counts there. Eigenvalues don't include
+// impacts: the hand's mass m_h answers one with a pulse of size m_h/M, which returns after the loop's delay, and with
+// m_h/M near 1 the next impact adds to the rest of it. So simulation finds the multiple of the smallest mass above
+// which no bouncing grows.
 #pragma once
 
 #include "controller/stability/stability.hpp"

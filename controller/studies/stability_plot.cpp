@@ -81,7 +81,6 @@ Enough enough_of(const Table& table, double delay_s) {
   return found;
 }
 
-// The stiffest hand.
 std::string limit_text(const Enough& limit) {
   return number_text(limit.up_to_N_per_m, 3) + " N/m" + (limit.all ? " and more" : "");
 }
@@ -147,7 +146,7 @@ struct Compared {
   double sensitivity, error;
 };
 
-// A test permits this relative difference between measured and predicted mass.
+// Relative difference between measured and predicted mass that a test permits.
 constexpr double tolerance = 0.02;
 
 struct Agreement {

@@ -12,8 +12,8 @@ namespace proxarm::studies {
 // Measured and predicted mass are compared only below this sensitivity of the boundary.
 inline constexpr double well_conditioned = 3.0;
 
-// The mass that is stable with the heaviest hand and the longest delay, at the timestep nearest to 1 ms: the hand's
-// stiffness up to which it is stable, and above which no mass is.
+// For each drawn delay the hand's stiffness up to which some mass is stable, with a hand of 1 kg and 20 Ns/m at the
+// timestep nearest to 1 ms.
 std::string stability_answer(const Table& table);
 
 // The largest difference between measured and predicted smallest mass, and the number of points.

@@ -34,7 +34,7 @@ std::string formatted(const char* format, double value) {
   return word.data();
 }
 
-// Ends at the second digit of the uncertainty, as further digits have no meaning.
+// Rounds to the second digit of the uncertainty, as further digits have no meaning.
 std::string value_text(double value, double half) {
   const int decimals = half > 0.0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(half))), 0, 7) : 6;
   std::array<char, 40> word{};

@@ -219,7 +219,7 @@ std::filesystem::path write_tool(const IdentifiedTool& tool, const PreparedSessi
   const auto edit = [&](const std::string& text) { return with_tool(text, cell, mass_kg, centre_S_m); };
   const auto check = [&](const Cell& written) {
     const auto& is = written.tool.centre_of_mass_S_m;
-    // six digits are written
+    // Six digits are written.
     constexpr double rounded = 1e-5;
     bool same = std::abs(written.tool.mass_kg - mass_kg) <= rounded * std::abs(mass_kg);
     for (std::size_t i = 0; i < 3; ++i) {

@@ -23,7 +23,7 @@ struct ProofOutcome {
 std::string failure_of(const PreparedSession& session, const ProofOutcome& outcome);
 
 // Runs in virtual time and prints nothing. `arm` is the simulated arm, which may differ from the controller's cell. A
-// simulated hand pushes when asked; with options.hand, that hand is at the handle all the time.
+// simulated hand pushes when asked; a hand in options.hand replaces it.
 ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
                              const proof::Task& task = {});
 
@@ -32,12 +32,12 @@ ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSessi
 ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options,
                                  const proof::Task& task = {});
 
-// Makes a session from a command's options. Throws SetupError.
+// Throws SetupError.
 using PrepareSession = PreparedSession (*)(const RunOptions& options);
 
-// Prepares the session of a command that moves the arm, and checks what forbids moving it: a real arm without
-// --hardware, options of a simulation on interfaces, a missing enabling switch, a bus that can't carry the timestep.
-// `arm`: the cell of the simulated arm; empty: the command's own. Throws SetupError.
+// Prepares a session that moves the arm. Refuses a real arm without --hardware, options of a simulation on interfaces,
+// a missing enabling switch, and a bus that can't carry the timestep. `arm`: the cell of the simulated arm; empty: the
+// command's own. Throws SetupError.
 PreparedSession session_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare);
 
 // Prepares the simulated arm's session: from the cell `arm`, or from the command's own if empty. Throws SetupError.

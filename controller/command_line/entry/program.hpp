@@ -18,8 +18,8 @@ int run_program(const std::function<int()>& run) noexcept;
 int refuse_options(const CLI::App& command, const std::string& called, const std::vector<std::string>& words,
                    const CLI::ParseError& error);
 
-// Parses the options of a program that is a single command, such as "proxarm study". Returns the exit status if the
-// program has nothing left to do: after --help, or if options were refused.
+// Parses the options of a single-command program such as "proxarm study". Returns the exit status if the program is
+// done: after --help, or if options were refused.
 std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv);
 
 }  // namespace proxarm::command_line

@@ -1,12 +1,13 @@
-// A Unix socket through which a running session takes orders and changes from its owner. A client sends one line and
-// gets one line back. A line is an order, such as "hold", or changes "NAME=VALUE", separated by tabs.
+// A Unix socket through which a running session takes orders and changes from its owner. A client sends one line, of at
+// most 1024 bytes, and gets one line back. A line is an order, such as "hold", or changes "NAME=VALUE", separated by
+// tabs.
 //
-// The socket has mode 0600 in a folder of mode 0700. The kernel reports who connects (SO_PEERCRED), so other users are
-// refused even on a file system without modes. Lines have at most 1024 bytes.
+// The socket has mode 0600 in a folder of mode 0700. The kernel reports the client's user (SO_PEERCRED), so other users
+// are refused even on a file system without modes.
 //
-// Orders are answered whatever other clients do. The socket serves sixteen connections at once, each for two seconds;
-// one more replaces the oldest. Changes take longer to judge than orders and are judged in a second thread. If the
-// process has no file descriptors left, the socket uses four that it has reserved.
+// Orders are answered whatever other clients do; changes take longer to judge and have their own thread. Sixteen
+// connections are served at once, each for two seconds; one more replaces the oldest. If the process has no file
+// descriptors left, four reserved ones are used.
 #pragma once
 
 #include <filesystem>

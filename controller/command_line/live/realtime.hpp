@@ -3,9 +3,9 @@
 
 namespace proxarm::command_line {
 
-// During its lifetime the calling thread runs under SCHED_FIFO on one processor, with its stack touched, the process's
-// memory locked, and deep sleep of processors disabled. For each measure that the machine doesn't permit or isn't set
-// up for, prints a line on standard error with the effect and a remedy, and goes on without it.
+// During its lifetime the calling thread runs under SCHED_FIFO on one processor, its stack is touched, the process's
+// memory is locked, and processors don't sleep deeply. A measure that the machine doesn't permit is left out, with a
+// line on standard error that names the effect and a remedy.
 class RealtimeThread {
  public:
   RealtimeThread();

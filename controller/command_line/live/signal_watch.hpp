@@ -1,10 +1,9 @@
-// Turns requests from outside to end the session into a controlled stop: every catchable signal that would end or
-// suspend the process, a lost terminal, and a standard output or error that has no reader any more.
+// Turns outside requests to end the session into a controlled stop: every catchable signal that would end or suspend
+// the process, a lost terminal, and a standard output or error without a reader.
 //
 // Not caught: SIGKILL and SIGSTOP, which can't be, and the signals of a crash (SIGSEGV, SIGBUS, SIGFPE, SIGILL,
-// SIGABRT, SIGTRAP, SIGSYS), after which the process can't be trusted: the drives' own watchdogs stop the arm. SIGPIPE,
-// SIGTTIN and SIGTTOU are ignored: writing fails instead, and the watch finds the cause. SIGHUP stays ignored if the
-// session was started with nohup.
+// SIGABRT, SIGTRAP, SIGSYS), after which only the drives' own watchdogs can be trusted. SIGPIPE, SIGTTIN and SIGTTOU
+// are ignored: writing fails instead, and the watch finds the cause. SIGHUP stays ignored under nohup.
 #pragma once
 
 #include <functional>

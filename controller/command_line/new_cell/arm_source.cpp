@@ -71,7 +71,6 @@ ChainJoint described(const UrdfTreeJoint& joint, const fs::path& file, std::vect
   return out;
 }
 
-// Fixes all joints that aren't in the chain.
 void fix_others(UrdfTree& tree, const UrdfTree::Path& chain, std::vector<std::string>& remarks) {
   for (UrdfTreeJoint& joint : tree.joints()) {
     const bool on_chain = std::find(chain.begin(), chain.end(), &joint) != chain.end();
@@ -145,7 +144,6 @@ void place_shapes(UrdfTree& tree, const fs::path& file, const Packages& packages
                     " links aren't there or are none that is drawn (STL, OBJ, PLY): --package NAME=DIR says where");
 }
 
-// Checks a joint between base and sensor.
 void require_drivable(const UrdfTreeJoint& joint, const fs::path& file) {
   if (joint.moves() && !(joint.axis().norm() > 0.0)) {
     throw SetupError({.file = file.string(),

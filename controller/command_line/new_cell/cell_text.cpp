@@ -120,7 +120,6 @@ std::string drives_text(const std::vector<description::DriveDescription>& drives
   return text;
 }
 
-// Writes the text as comment lines.
 std::string commented(const std::string& text) {
   constexpr std::size_t width = 116;
   std::string out, line = "#";

@@ -21,7 +21,7 @@ constexpr double gear_Hz = 25.0, stiffest_gear_Hz = 150.0, least_stiffness_share
 constexpr double hand_N = 100.0;
 // A tenth of a drive's torque is for friction and the other joints' motion; links may weigh a fifth more than stated.
 constexpr double torque_share = 0.9, weight_margin = 1.2;
-// The largest force that sensor and handle bear, and the smallest with which a new cell's first hands can work.
+// The largest force that sensor and handle bear, and the smallest that the default hands need.
 constexpr double most_force_N = 200.0, least_force_N = 60.0;
 // Accelerations divided by the speed, 1/s: the usual one (full speed in a 15th of a second), and the least plausible
 // one.

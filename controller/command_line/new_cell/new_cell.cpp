@@ -123,7 +123,7 @@ class NewCell {
     }
     fs::copy_file(file, folder_ / "sensor.yaml", fs::copy_options::overwrite_existing);
     if (sensor_.protocol == "ati_net_can_oem") {
-      // sent before all other frames on a shared bus
+      // Sent before all other frames on a shared bus.
       sensor_keys_ = "  base_id: 0x12\n  sample_rate_Hz: 7147\n  bandwidth_Hz: 800\n";
       return;
     }
@@ -360,15 +360,14 @@ class NewCell {
     return free.steady;
   }
 
-  // Returns the steady mass with this damping in the cell.
   std::optional<double> advised_mass_with(double damping_Ns_per_m) {
     cell_.default_damping_Ns_per_m = damping_Ns_per_m;
     save();
     return advised_mass();
   }
 
-  // A mass that hands lead easily needs no damping. If a larger one is needed or none is steady, also tries the
-  // dampings that a hand takes for a heavier handle, and keeps the least that saves a quarter of the mass.
+  // A mass that hands lead easily needs no damping. For a larger one, or if none is steady, also tries dampings that a
+  // hand takes for a heavier handle, and keeps the least that saves a quarter of the mass.
   std::optional<double> advised_mass_and_damping() {
     constexpr double easy_kg = 10.0, worth = 0.75;
     const auto without = advised_mass_with(0.0);

@@ -18,7 +18,7 @@ using models::Vec3;
 
 constexpr int poses = 20000;
 constexpr std::size_t tried = 2000;  // of them, for the hand's path
-// Step along that path, per metre of reach up to one. The inverse kinematics may turn joints further in one call.
+// Step along that path, per metre of reach up to one; shorter than one call of the inverse kinematics can follow.
 constexpr double step_share = 2e-3;
 // Closer to an axis than this the tool counts as on it: turning about the axis doesn't move the tool.
 constexpr double at_an_axis_m = 1e-3;
@@ -161,7 +161,6 @@ double gone_m(const models::Arm& arm, models::InverseKinematics inverse, const J
   return std::numeric_limits<double>::infinity();
 }
 
-// The length of the first straight piece of a hand's path.
 double first_piece_m(const description::HandDescription& hand) {
   for (const description::Waypoint& waypoint : hand.waypoints) {
     const double length_m = Vec3(waypoint.offset_m.data()).norm();

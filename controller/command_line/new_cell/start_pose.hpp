@@ -22,11 +22,11 @@ description::HandDescription with_shorter_way(description::HandDescription hand,
 description::HandDescription with_way_in(const models::ToolSpace& space, description::HandDescription hand);
 
 // Searches twenty thousand poses all over the joints' ranges. In a good pose the tool can move well in all directions
-// (place_margin.hpp), the wrist is far from its singularity, and all joints are far from their ends. The tool is in
-// front of the base at a height of a fifth to four fifths of the reach and points forwards or down; the joints are
-// above the floor. Returns the best poses, at most `most`, from which the arm can follow the hand's whole path, else
-// half of it or less; each differs from all before by more than 0.3 rad (or 0.3 m) in some joint. An upright first
-// joint is turned straight ahead if possible. If no pose allows a tenth of the path, returns the best one with way = 0.
+// (place_margin.hpp), the wrist is far from its singularity, and all joints are far from their ends and above the
+// floor. The tool is in front of the base at a fifth to four fifths of the reach and points forwards or down. Returns
+// at most `most` poses, the best first, from which the arm can follow the hand's whole path, else half of it or less;
+// they differ by more than 0.3 rad (or 0.3 m) in some joint. An upright first joint is turned straight ahead if
+// possible. If a tenth of the path is too much everywhere, returns the best pose with way = 0.
 std::vector<StartPose> find_starts(const models::Arm& arm, const description::HandDescription& hand, std::size_t most);
 
 // Returns the direction out of the arm, in the sensor's link: the axis of the last joint, away from the joints before

@@ -228,7 +228,7 @@ std::string UrdfTree::found_tip() const {
     at = way->child;
     if (way->moves()) last_moved = at;
   }
-  // The links fixed to the last moving one with a usual name, the best name first.
+  // Of the links fixed to the last moving one, takes the one with the best of these names.
   std::vector<std::string> fixed{last_moved};
   for (std::size_t k = 0; k < fixed.size(); ++k) {
     for (const UrdfTreeJoint* joint : below(fixed[k])) {

@@ -166,8 +166,7 @@ void add_drive(PlannedBus& bus, const PreparedSession& session, std::size_t axis
   for (const PlannedFrame& frame : {feedback, target}) bus.frames.push_back(frame);
 }
 
-// Fills gauges first, first + 2 and first + 4 at `at` of the frame with the readings of a push and the converter's
-// noise.
+// The frame's last six bytes hold gauges first, first + 2 and first + 4: the bias plus a random push and noise.
 std::vector<fieldbus::CanFrame> typical_gauges(const PreparedSession& session, PlannedFrame frame, std::size_t first) {
   std::mt19937 random(1);
   std::uniform_int_distribution<int> around(-500, 500);

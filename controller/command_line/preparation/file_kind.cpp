@@ -58,7 +58,6 @@ const char* name_of(FileKind kind) {
   return "a file of another kind";
 }
 
-// Says how to give a file of that kind.
 const char* advice_for(FileKind kind) {
   switch (kind) {
     case FileKind::cell:

@@ -136,8 +136,8 @@ void set_timestep(PreparedSession& session, const RunOptions& options, double pe
   require_period(session, options);
 }
 
-// A setpoint is reached one period after it is latched. That period adds to the one that any sampled loop has. A torque
-// acts at once and is held for a period, which is half a period of delay.
+// A setpoint is reached one period after it is latched, in addition to the period of any sampled loop. A torque is held
+// for a period, which delays it by half a period.
 double loop_delay_s(const PreparedSession& session) {
   if (session.impedance()) return 0.5 * session.settings.period_s;
   return session.settings.period_s + sensor_delay_s(session.cell.sensor) + stream_delay_s(session.sensor) +
@@ -210,7 +210,6 @@ void choose_tool(PreparedSession& session, const RunOptions& options) {
   }
 }
 
-// Refuses what can't be rendered with a rigid tool.
 void require_renderable_tool(PreparedSession& session) {
   if (!session.scene.tool) return;
   const auto refuse = [&](const char* key, const std::string& found, const char* expected) {
@@ -368,8 +367,8 @@ controller::LoopModel turning_loop(const PreparedSession& session) {
 }
 
 namespace {
-// Returns whether the hand turns the tool. If the hand doesn't twist the handle, there is no loop: the proxy's own pole
-// at 1 would count as unstable.
+// Whether the hand turns the tool. If the hand doesn't twist the handle there is no loop, and the proxy's own pole at 1
+// would count as unstable.
 bool is_turned(const PreparedSession& session) {
   return !session.impedance() && session.settings.orientation != controller::OrientationMode::held &&
          session.cell.drives.size() >= 6 && session.hand.twists();
@@ -427,10 +426,10 @@ description::SetupProblem timestep_problem(const description::Cell& cell, const 
           .key = "default_period_s"};
 }
 
-// The loosest grip that is judged. A hand without stiffness, such as one that plays a recorded force, leaves the tool
-// to drift. The drift is an eigenvalue of exactly 1 at any mass, which the check must ignore; with this grip it decays.
-// It moves a kilogram with a period of six seconds, far slower than any oscillation of interest, and keeps D > K L for
-// any delay L below a second.
+// The loosest grip that is judged. A hand without stiffness, such as one that plays a recorded force, lets the tool
+// drift: an eigenvalue of exactly 1 at any mass, which isn't an instability. With this grip the drift decays. A
+// kilogram then has a period of six seconds, far slower than any oscillation of interest, and D > K L for any delay L
+// below a second.
 constexpr double loosest_N_per_m = 1.0, loosest_Ns_per_m = 1.0;
 
 namespace {

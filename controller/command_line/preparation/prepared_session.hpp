@@ -33,8 +33,8 @@ struct PreparedSession {
   [[nodiscard]] bool impedance() const noexcept { return settings.scheme == controller::Scheme::impedance; }
 };
 
-// The hand for the stability check: the grip that needs the most mass in this loop. That needn't be the stiffest grip:
-// one that is nearly as stiff with little damping needs more. If a grip has no stable mass, returns that grip.
+// The hand for the stability check: the grip that needs the most mass in this loop, or one without a stable mass. It
+// isn't always the stiffest: one that is nearly as stiff with little damping needs more.
 controller::HandModel hand_model(const PreparedSession& session, controller::LoopModel loop);
 // The same in the session's own loop.
 controller::HandModel hand_model(const PreparedSession& session);
@@ -42,8 +42,8 @@ controller::HandModel hand_model(const PreparedSession& session);
 // The hand and the loop of the tool's rotation, in Nm/rad, Nms/rad and kg m².
 controller::HandModel turning_hand_model(const PreparedSession& session);
 controller::LoopModel turning_loop(const PreparedSession& session);
-// The loop of translation and rotation together, for pose_loop_at(): free, and with the tool's extreme points in
-// contact. Absent: the hand doesn't turn the tool.
+// The loop of translation and rotation for pose_loop_at(), free and with the tool's extreme points in contact. Absent:
+// the hand doesn't turn the tool.
 std::optional<controller::PoseLoopModel> turned_model(const PreparedSession& session);
 // The slowest decaying oscillation of that loop in the start pose. Absent: the tool isn't turned, or the loop isn't
 // stable.
@@ -80,14 +80,14 @@ PreparedSession with_gear_torques(PreparedSession session, const description::Ge
 description::SetupProblem timestep_problem(const description::Cell& cell, const RunOptions& options);
 
 // Throws SetupError if the handle alone is heavier than the mass, or if the loop with the hand would be unstable
-// (unless forced, which only a simulation may be). Impedance type: checks the virtual coupling.
+// (unless forced, in simulation only). Impedance type: checks the virtual coupling.
 void require_stable(const PreparedSession& session, const RunOptions& options);
 
 // Throws SetupError if a turning tool's inertia isn't above the handle's own, or is too large to be turned.
 void require_inertia_in_range(const PreparedSession& session);
 
-// The delay from the proxy's step to the links following it: the setpoint is latched at the next SYNC and reached a
-// period later; the setpoint filter adds its delay. Impedance type: 0, because the proxy stays where the tool may be.
+// The delay from the proxy's step to the links: the setpoint is latched at the next SYNC and reached a period later,
+// and the setpoint filter adds its delay. Impedance type: 0, as the proxy stays where the tool may be.
 double motion_delay_s(const PreparedSession& session);
 
 // The delay from a force on the handle to the arm having followed the proxy (s).

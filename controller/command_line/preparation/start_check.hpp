@@ -8,14 +8,14 @@
 
 namespace proxarm::command_line {
 
-// Makes all checks of files and options that `run` makes before it opens a bus. `check` uses it for a cell. It includes
-// the three checks below, stable masses, and in simulation that the buses carry the timestep. Throws SetupError.
+// Checks files and options as `run` does before it opens a bus; `check` uses it for a cell. Includes the three checks
+// below, stable masses, and in simulation that the buses carry the timestep. Throws SetupError.
 void require_runnable(const PreparedSession& session, const RunOptions& options);
 
-// Returns a warning line for each value that is valid but probably unintended. These are values that look like another
-// unit (controller/plausibility/doubts.hpp), a simulated hand that pushes before the sensor is tared, doubtful meshes
-// (scenes/mesh_files/mesh_report.hpp), a rigid tool longer than the arm, and poses in which the arm's weight takes all
-// the torque that setpoints may ask of a drive (controller/setpoints/held_weight.hpp).
+// Returns a warning line for each valid but probably unintended value: values that look like another unit
+// (controller/plausibility/doubts.hpp), a simulated hand that pushes before the tare, doubtful meshes
+// (scenes/mesh_files/mesh_report.hpp), a rigid tool longer than the arm, and a weight that takes all the torque that
+// setpoints may ask of a drive (controller/setpoints/held_weight.hpp).
 std::vector<std::string> surprises(const PreparedSession& session);
 void warn_of_surprises(const PreparedSession& session);  // on standard error
 

@@ -396,7 +396,6 @@ class Builder {
   std::map<std::string, Places> by_path_;
 };
 
-// Throws if the specimens are incomplete.
 void require_complete(const MapModel& model) {
   for (const KeyModel& key : model.keys) {
     if (key.meaning.empty() && !model.names && !is_refused(key)) {

@@ -130,7 +130,7 @@ Json described(const KeyModel& key, const std::string& unit) {
   return schema;
 }
 
-// What applies under the same conditions.
+// Properties and required keys under one condition.
 struct Branch {
   Json condition{}, properties = Json::object(), required = Json::array();
 };

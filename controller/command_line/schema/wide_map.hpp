@@ -5,9 +5,9 @@
 
 namespace proxarm::command_line {
 
-// Gives each key of the root with "(of PATH)" in its comment the keys of the maps there, except those that its reader
-// refuses. No key is required in it, and a key that depends on others accepts the values of all cases, because only the
-// reader knows where a map gets its keys from. The same applies to the maps themselves while such a key is present.
+// Gives each key of the root whose comment says "(of PATH)" the keys of the maps there, except those that its reader
+// refuses. No key is required in it, and dependent keys accept the values of all cases, because only the reader knows
+// where a map gets its keys from. While such a key is present, the same applies to the maps themselves.
 void share_keys(MapModel& root, const Specimens& specimens);
 
 }  // namespace proxarm::command_line

@@ -1,9 +1,8 @@
-// Writes the black box in a separate process when a session ends in a fault or crashes.
+// Writes the black box from a separate process when a session ends in a fault or crashes.
 //
 // The process is forked before the session opens files or starts threads. It shares the box's memory and sleeps until
-// its pipe reports the session's end or closes without a message. A signal handler would be limited to
-// async-signal-safe calls and to a damaged stack and heap, and could not catch SIGKILL. A healthy process writes files
-// normally, whatever ended the session. The cycle has no extra work.
+// its pipe reports the session's end or closes. A signal handler could only make async-signal-safe calls on a damaged
+// stack and heap, and would never see SIGKILL. The cycle has no extra work.
 #pragma once
 
 #include <filesystem>

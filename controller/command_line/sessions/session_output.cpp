@@ -332,7 +332,7 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
 
 int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   progress_.clear();
-  // faults that were reset come first
+  // Faults that were reset come first.
   const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
   if (options_.view_place) {
     summary.view = {options_.view_place->port, options_.view_place->most_viewers, options_.view_control};
@@ -359,7 +359,7 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
 
 bool SessionOutput::draw_plot(const Summary& summary) {
   if (!plot_) return true;
-  if (plot_->is_empty()) {  // the session was stopped before rendering, by the user
+  if (plot_->is_empty()) {  // stopped before rendering; the user knows
     if (!options_.json) std::printf("  plot:                     none; nothing was rendered\n");
     return true;
   }

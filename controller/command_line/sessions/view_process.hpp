@@ -1,8 +1,8 @@
 // The session's side of the view: starts the process that shows the session, and tells it what to show and how the
 // session ended.
 //
-// That process (command_line/view/live_view.hpp) is another program, so none of its code is in the session's memory. It
-// only reads the black box's memory, which the cycle writes anyway. If it crashes, the session goes on unchanged.
+// That process (command_line/view/live_view.hpp) is another program, so the session has none of its code in memory. It
+// only reads the black box's memory. If it crashes, the session goes on unchanged.
 #pragma once
 
 #include <cstdint>

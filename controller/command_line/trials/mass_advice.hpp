@@ -9,12 +9,12 @@
 namespace proxarm::command_line {
 
 // Returns the felt mass, handle included, at which the loop is just stable with the margins of
-// controller::with_margins: the largest mass over the hand as described and a stiffer, heavier one, and over the delay
-// as it is and a longer one.
+// controller::with_margins: also for a stiffer and heavier hand, and for a longer delay.
 std::optional<double> smallest_with_margins(const controller::HandModel& hand, const controller::LoopModel& loop);
 
-// Returns the least of controller::tried_dampings that halves the mass with margins at least; nullopt if none does. It
-// is at most 20 Ns/m: at 0.2 m/s that is 4 N, which a hand takes for a heavier handle.
+// Returns the least of controller::tried_dampings with which the mass with margins is at most half of that without
+// damping; nullopt if there is none. It is at most 20 Ns/m: at 0.2 m/s that is 4 N, which a hand takes for a heavier
+// handle.
 inline constexpr double most_for_comfort_Ns_per_m = 20.0;
 std::optional<controller::DampedMass> worthwhile_damping(const controller::HandModel& hand,
                                                          const controller::LoopModel& loop);

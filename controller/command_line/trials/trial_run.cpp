@@ -101,7 +101,7 @@ class TrialArm {
                                          }};
     controller::run_session(cycle, network_, {seen_s_ + 1.0}, hooks);
     result_.end = end_.empty() ? end_of(cycle.supervisor()) : end_;
-    // If a fault has ended the session early, the observation still lasts to its end.
+    // The observation lasts to its end even if a fault has ended the session.
     const sim::Truth truth = far_end_.truth();
     const auto rest_ns = static_cast<std::int64_t>(1e9 * std::max(0.0, seen_s_ - since_hand_s(truth)));
     network_.sleep_until(network_.now_ns() + rest_ns);

@@ -90,7 +90,7 @@ void add_options(CLI::App& app, command_line::ViewOptions& options) {
 }
 
 int run(const std::vector<std::string>& words, char** argv) {
-  // started by a session (sessions/view_process.cpp)
+  // Started by a session (sessions/view_process.cpp).
   if (words.size() == 3 && words[0] == "--live") {
     return command_line::live_view(std::atoi(words[1].c_str()), std::atoi(words[2].c_str()));
   }

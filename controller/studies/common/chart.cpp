@@ -110,7 +110,7 @@ void draw_note(std::ostream& gp, const Note& note, int label) {
      << rgb("ink") << " boxed\n";
 }
 
-// Writes a point a line; a y that isn't finite leaves a gap.
+// Writes one point per line; a y that isn't finite leaves a gap.
 void write_points(std::ostream& data, const Curve& curve) {
   for (std::size_t k = 0; k < curve.x.size(); ++k) {
     if (std::isfinite(curve.y[k])) {

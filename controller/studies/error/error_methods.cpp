@@ -174,7 +174,7 @@ Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps, double t_0
     if ((k + 1) % per_instant != 0) continue;
     const CaseState exact = which.exact(t);
     sum_q += (stepper.q() - exact.q).squaredNorm();
-    // The velocity of a step with an impact belongs to no instant.
+    // In a step with an impact the velocity jumps, so it isn't compared.
     if (which.stop_s < 0.0 || std::abs(t - which.stop_s) > 2.0 * which.duration_s / instants) {
       sum_v += (stepper.v() - which.exact(stepper.v_label_s(t)).v).squaredNorm();
       ++counted_v;
@@ -195,7 +195,7 @@ double ns_per_step(auto& stepper, double T, int steps) {
   const auto begun = std::chrono::steady_clock::now();
   for (int k = 0; k < steps; ++k) stepper.step(k * T);
   const double ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begun).count();
-  // never true, but keeps the compiler from removing the steps
+  // Never true, but keeps the compiler from removing the steps.
   return std::isnan(stepper.q().x()) ? infinity : ns / steps;
 }
 

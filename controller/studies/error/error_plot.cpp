@@ -236,7 +236,7 @@ Worst worst_of(const RunsByCase& all, Method method) {
   return worst;
 }
 
-// The penalty method with the smallest largest error.
+// The penalty method whose largest error is smallest.
 Method best_penalty(const RunsByCase& all) {
   Method best = penalty_euler;
   for (const Method method : {penalty_rk4, penalty_implicit}) {
@@ -257,7 +257,7 @@ std::string short_title(Method method) {
   return title.substr(title.find(", ") + 2);
 }
 
-// The price of the smaller error.
+// States the step times of order 2 and of the best penalty method.
 std::string step_answer(const RunsByCase& all) {
   const Method rival = best_penalty(all);
   return "A step of order 2 takes " + nanoseconds(worst_of(all, order_2)) + ", of " + short_title(rival) + " " +
@@ -305,7 +305,6 @@ Glance empty_glance(const RunsByCase& all) {
   return glance;
 }
 
-// Adds a method's marks.
 void add_method(const RunsByCase& all, std::size_t method, Glance& glance) {
   Curve error{
       .name = method_titles[method], .style = static_cast<int>(method), .marks = true, .line = false, .mark_size = 1.1};

@@ -52,8 +52,8 @@ const Runs* fixed_runs(const std::vector<Runs>& list, const Fixed& fixed);
 // The best penalty method for 0.1 mm.
 const Runs& best_tuned(const std::vector<Runs>& list);
 
-// The other methods' run time divided by ours at equal error; median over the errors that both reach. The other is the
-// best one for each error, or one method. Low and high include the scatter of the step times against us and for us.
+// The other methods' run time divided by ours at equal error; median over the errors that both reach. `rivals`: the
+// best of them for each error. Low and high include the scatter of the step times against us and for us.
 Spread speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals);
 Spread speedup_over(const Runs& ours, const Runs& rival);
 

@@ -2,7 +2,6 @@
 //
 // A wall pushes in proportion to the depth and to the speed into it, and never pulls; friction is a damper up to μ f_n.
 // Distances, normals and derivatives of the plane or sphere are in closed form, so a step does no unnecessary work.
-// could do without.
 #pragma once
 
 #include <vector>

@@ -203,7 +203,7 @@ Panel tool_panel(const Table& table, const char* error, const char* title, const
               .y_spans = {{tool_bottom, least_tool_error, "rounding"}}};
   int style = 0;
   for (const ToolCase& which : tool_cases()) {
-    // larger, since other curves may lie on the first one
+    // Larger, since other curves may lie on the first one.
     Curve curve{.name = which.title, .style = style, .marks = true, .mark_size = style == 0 ? 1.5 : 0.9};
     ++style;
     for (std::size_t row = 0; row < table.rows(); ++row) {

@@ -57,7 +57,7 @@ class Laws {
   template <int N>
   [[nodiscard]] bool obeyed(const Call<N>& call) const;
 
-  // How far the objects have been moved, m; the rounding of their places is in proportion.
+  // How far the objects have been moved, m; their places are rounded in proportion.
   [[nodiscard]] double carriage(double time_s) const;
 
   // Returns q moved with the object.

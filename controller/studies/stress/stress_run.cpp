@@ -138,7 +138,6 @@ class Push {
   Vec3 towards_;
 };
 
-// Judges one step.
 template <int N>
 class Judge {
  public:

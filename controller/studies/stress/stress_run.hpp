@@ -8,8 +8,8 @@
 
 namespace proxarm::studies {
 
-// The worlds: random_scene(), random_mesh_scene() or random_layer_scene(). Each is its own study, so that a change to
-// one leaves the others' seeds unchanged. order_2: random_scene() with order 2 only. tools: rigid tools in
+// The worlds: random_scene(), random_mesh_scene() or random_layer_scene(). Each is its own study, so that a change of
+// one doesn't change the others' worlds. order_2: random_scene() with order 2 only. tools: rigid tools in
 // random_tool_scene() (tool_run.hpp); moving_tools: the same in motion.
 enum class StressWorlds { all, meshes, layers, order_2, tools, moving_tools };
 
