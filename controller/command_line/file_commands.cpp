@@ -86,7 +86,7 @@ void tell_meshes(const scenes::Scene& scene) {
   }
 }
 
-// Checks the laws of a point's 𝒢. If the scene has a tool, throws SetupError for what the tool can't be rendered with.
+// Checks the laws of a point's 𝒢. Throws SetupError if the scene's tool can't be rendered with its objects.
 const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOptions& options) {
   if (scene.tool) {
     scenes::compile_rigid(scene, scene.tool->shape);
@@ -115,8 +115,8 @@ void require_simulable(const PreparedSession& session) {
   const sim::SimulatedCell far_end(session.cell, session.sensor, session.hand, network.events());
 }
 
-// Checks a cell with the files that it names: builds each device as the controller would, and throws what `run` would
-// throw.
+// Checks a cell with the files that it names: builds each device as the controller would, and refuses what `run` would
+// refuse.
 void check_cell(const fs::path& file, const fs::path& scene) {
   const description::Cell cell = description::load_cell(file);
   if (!cell.default_scene.empty()) description::require_default_file(cell, "default_scene", cell.default_scene);
@@ -227,8 +227,8 @@ int check_command(const CheckFilesOptions& options) {
 
 namespace {
 
-// Describes a cycle of the default cell beyond 𝒢, counted in its default session. If the cell can't render the scene,
-// returns the reason.
+// Describes what a cycle of the default cell computes around 𝒢, counted in its default session. If the cell can't
+// render the scene, returns the reason.
 std::string explain_cycle(const fs::path& scene) {
   RunOptions options;
   options.scene = scene;

@@ -246,7 +246,7 @@ void print_tried_damping(const Tuned& of, const controller::DampedMass& damped) 
   std::printf("  tried: %s\n", tried.text.c_str());
 }
 
-// Called if no mass has its margins without damping.
+// Precondition: without damping no mass has its margins.
 void print_needed_damping(const Tuned& of) {
   of.stages.begin("damping with margins");
   const auto needed = damping_needed(of.hand, of.loop);

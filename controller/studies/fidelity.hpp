@@ -20,7 +20,7 @@
 namespace proxarm::studies {
 
 struct ArmSine {
-  double frequency_Hz = 1.0, amplitude = 0.0;  // m; if the hand turns the tool, rad
+  double frequency_Hz = 1.0, amplitude = 0.0;  // amplitude in m, or in rad if the hand turns the tool
 };
 
 // A session of the fidelity study.

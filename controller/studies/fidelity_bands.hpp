@@ -19,7 +19,8 @@ inline constexpr double lowest_band_Hz = 0.3;
 // logarithms of the measured points. 0: above the limit from the beginning.
 double band_Hz(const std::map<double, double>& error_of_Hz, double limit);
 
-// "up to 1.2 Hz", or words for an error that passes the limit nowhere or from the beginning.
+// The band in words, such as "up to 1.2 Hz"; also if the error stays below the limit, or is above it from the
+// beginning.
 std::string band_text(const std::map<double, double>& error_of_Hz, double limit);
 
 // For example "5 %".

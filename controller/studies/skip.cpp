@@ -83,7 +83,7 @@ Scene globe(std::size_t count) {
   return scene;
 }
 
-// The time to ask every object for its distance, the least cost of a step that skips no object.
+// The time to compute the distance of every object: the least that a step costs if it skips none.
 double all_ns(const Scene& scene, const Vec3& at) {
   double best = std::numeric_limits<double>::infinity();
   if (const auto* mesh = std::get_if<scenes::MeshShape>(&scene.objects.front().shape)) {

@@ -76,7 +76,7 @@ controller::AdmittanceConfig config(const LoopModel& loop, double mass_kg) {
   return config;
 }
 
-// Rates of runs that tell only the sign.
+// Rates returned if a run tells only the sign.
 constexpr double blew_up = 1e3, died = -1e3;
 
 // ln r of the recorded motion from the share `from` on: half the least-squares slope of ln(q(k)² − q(k+s) q(k−s)).
@@ -191,8 +191,8 @@ Contact push_against_wall(const HandModel& hand, const LoopModel& loop, double m
 // Masses tried at walls, as multiples of the smallest stable mass.
 constexpr std::array<double, 8> wall_multiples{1.02, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 2.0};
 
-// The least multiple such that nothing grows at the wall with it or any larger one. Infinite if it grows with the
-// largest.
+// The least multiple of the smallest mass from which on bouncing at the wall doesn't grow, with it and with all larger
+// ones tried. Infinite if it grows with the largest.
 double bears_walls_from(const HandModel& hand, const LoopModel& loop, double smallest_kg) {
   double from = std::numeric_limits<double>::infinity();
   for (std::size_t i = wall_multiples.size(); i-- > 0;) {

@@ -22,8 +22,7 @@ struct SimulatedArm {
                const description::HandDescription& hand = nobody());
 
   void power_on();
-  // Brings the devices up and returns the parts of a cycle that leads the arm. Precondition: `scene` outlives the
-  // parts.
+  // Brings the devices up and returns the parts of a cycle for this arm. Precondition: `scene` outlives the parts.
   controller::CycleParts brought_up(const PreparedSession& session, scenes::CompiledScene& scene);
 
   fieldbus::SimulatedCanNetwork network;

@@ -21,7 +21,7 @@ struct MarkedPose {
 // SetupError if that doesn't fit 32 bits.
 std::int32_t offset_by(const description::DriveDescription& drive, double angle_rad, std::int32_t counts);
 
-// Returns the difference between the angle by `offset` and the mark in this pose, rad.
+// Returns the angle computed with `offset` minus the mark in this pose, rad.
 double off_by(const description::DriveDescription& drive, std::int32_t offset, double angle_rad, std::int32_t counts);
 
 // Returns the cell's text with drives[i].offset_counts = offsets[i]; everything else, comments too, stays. Throws

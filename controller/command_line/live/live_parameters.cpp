@@ -28,7 +28,7 @@ struct Live {
   double (*parse)(std::string_view text, std::string_view option);
 };
 
-// Its value is a time, or a word from which choose_horizon() finds one.
+// The value is a time, or a word such as auto from which choose_horizon() finds a time.
 bool is_lookahead(const std::string& text) { return text.compare(0, 10, "lookahead=") == 0; }
 
 bool is_tool(const std::string& text) {

@@ -27,7 +27,7 @@ class LiveParameters {
   void require_tool(const LiveParameters& before, const controller::ToolEvidence& seen) const;
   // Returns whether the text is like "timestep=2ms".
   [[nodiscard]] static bool is_timestep(const std::string& text);
-  // Makes the start's checks that depend on T. Throws SetupError.
+  // Repeats those checks of the start that depend on T. Throws SetupError.
   controller::Timestep take_timestep(const std::string& text);
   // Takes over the session's actual timestep: drives may have refused the last change.
   void follow(double period_s);

@@ -356,7 +356,7 @@ controller::LoopModel turning_loop(const PreparedSession& session) {
   loop.horizon_s = 0.0;  // only the translation is predicted
   loop.order = 1;
   loop.layers = nullptr;  // the tool's place is held
-  // Feed-forward drives with a held place would need a quarter more inertia than necessary; PoseLoop judges them.
+  // With the place held, feed-forward would seem to need a quarter more inertia than it does; PoseLoop judges it.
   loop.either_drive = false;
   loop.handle_mass_kg = models::tool_inertia(session.cell.tool).largest_kg_m2;
   loop.damping_Ns_per_m = session.settings.rotational_damping_Nms_per_rad;
@@ -457,7 +457,7 @@ std::vector<description::Grip> other_grips(const description::HandDescription& h
 }
 }  // namespace
 
-// Computes the smallest mass only for a grip that is unstable with the smallest mass found so far.
+// The smallest stable mass is computed for a grip only if the smallest mass found so far is unstable with it.
 controller::HandModel hand_model(const PreparedSession& session, controller::LoopModel loop) {
   const description::Grip tightest = description::tightest_grip(session.hand);
   controller::HandModel worst = held_with(tightest, session.hand.mass_kg);
@@ -483,7 +483,7 @@ std::vector<models::JointVector> led_poses(const PreparedSession& session) {
     leads.push_back({.offset_m = models::Vec3(waypoint.offset_m.data())});
     if (is_turned(session)) leads.back().turn_rad = models::Vec3(waypoint.turn_rad.data());
   }
-  // Both ends of each sine, and both ends of their sum.
+  // Poses at both ends of each sine, and at both ends of the sum of all sines.
   controller::Lead all;
   const auto add_both = [&](const controller::Lead& lead) {
     leads.push_back(lead);

@@ -33,8 +33,9 @@ struct PreparedSession {
   [[nodiscard]] bool impedance() const noexcept { return settings.scheme == controller::Scheme::impedance; }
 };
 
-// The hand for the stability check: the grip that needs the most mass in this loop, or one without a stable mass. It
-// isn't always the stiffest: one that is nearly as stiff with little damping needs more.
+// The hand for the stability check, with the grip that needs the most mass in this loop. That isn't always the stiffest
+// grip: one that is nearly as stiff but has little damping needs more. If no mass is stable with some grip, returns
+// that grip.
 controller::HandModel hand_model(const PreparedSession& session, controller::LoopModel loop);
 // The same in the session's own loop.
 controller::HandModel hand_model(const PreparedSession& session);

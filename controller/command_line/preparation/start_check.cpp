@@ -106,7 +106,7 @@ void require_turning(const PreparedSession& session, const models::Arm& arm) {
                     .expected = "held: fewer than six axes can't turn the tool as a hand likes"});
 }
 
-// Returns the object that contains the point most deeply, each object judged in its own scene.
+// Returns the object that contains the point most deeply; each object is judged alone.
 const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
   const scenes::Object* found = nullptr;
   double least_m = std::numeric_limits<double>::infinity();

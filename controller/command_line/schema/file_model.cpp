@@ -65,7 +65,7 @@ void leave_out(std::vector<Alternative>& all, Alternative::Kind kind) {
   std::erase_if(all, [&](const Alternative& a) { return a.kind == kind; });
 }
 
-// The kinds of value as which a key was read in one place.
+// The kinds of value that the reader takes for a key in one place.
 std::vector<Alternative> scalars_of(const KeyFacts& facts) {
   using Kind = Alternative::Kind;
   std::vector<Alternative> all;
@@ -248,7 +248,7 @@ class Builder {
     return all;
   }
 
-  // The kinds as which a key was read here; empty if the reader only asked whether it is there.
+  // The kinds of value that the reader takes for a key here; empty if it only asked whether the key is there.
   static std::string kinds_of(const Place& place, const KeyFacts& facts) {
     std::string kinds;
     for (const Alternative& a : scalars_of(facts)) kinds += static_cast<char>('a' + static_cast<int>(a.kind));

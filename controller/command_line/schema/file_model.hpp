@@ -30,9 +30,9 @@ struct Alternative {
   enum class Kind : std::uint8_t { map, list, numbers, number, integer, boolean, text, path, choice };
   Kind kind = Kind::text;
   description::Range range{};
-  description::Range outer{};  // the range asked for first: the bounds whatever other keys say
+  description::Range outer{};  // the range that the reader asked for first, which holds whatever other keys say
   bool zero = false;           // 0 is also allowed
-  bool is_bounded = true;      // false: other keys' values are its bounds
+  bool is_bounded = true;      // false: its bounds are other keys' values
   std::size_t min_size = 0, max_size = static_cast<std::size_t>(-1);
   std::vector<std::string> choices{};
   std::vector<std::int64_t> values{};
@@ -64,7 +64,8 @@ bool is_refused(const KeyModel& key) noexcept;
 struct MapModel {
   std::string path;
   std::vector<KeyModel> keys{};
-  std::optional<std::string> names{};  // keys are the user's names: `keys` has one, whose cases apply to each
+  std::optional<std::string>
+      names{};  // pattern of keys that are names of the user's choice; `keys` then has one model for all
   std::vector<std::string> exactly_one{};
   std::string keys_of{};  // not empty: its keys are a subset of the keys of the maps at that path
 };

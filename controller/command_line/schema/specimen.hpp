@@ -21,7 +21,7 @@ enum class Standing : std::uint8_t { optional, required, refused };
 struct KeyFacts {
   std::string key;
   Standing standing = Standing::optional;
-  bool is_told = false;  // its standing, known from the first question that tells it
+  bool is_told = false;  // whether the standing is known; the first question that tells it counts
   std::vector<description::YamlFact> facts{};
   std::optional<description::Json> otherwise{};
 };

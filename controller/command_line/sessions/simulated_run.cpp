@@ -23,8 +23,8 @@ using controller::Cycle;
 using controller::CycleRecord;
 using SteadyClock = std::chrono::steady_clock;
 
-// Runs virtual time at the pace of the wall clock, for viewers: each cycle waits until it is due. No cycle is skipped,
-// and the setpoints equal those without waiting to the bit.
+// Makes virtual time keep pace with the wall clock, for viewers: each cycle waits until it is due. No cycle is skipped,
+// and the setpoints are the same to the bit as without waiting.
 class Spectator {
  public:
   explicit Spectator(bool looks) : looks_(looks) {}

@@ -23,7 +23,7 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   if (turns) {
     options.inertia_kg_m2 = setup.inertia_kg_m2;
     options.hand = shipped_file("sim/hands/wobble.yaml");
-    // Such a tool swings on the wrist at 3 Hz, above the band of voluntary hand motion. Here that swing is intended.
+    // With such a tool the wrist oscillates at 3 Hz, above the band of voluntary hand motion; here the hand means to.
     options.passivity = controller::Passivity::off;
   }
   options.scene = shipped_file(setup.wall ? "scenes/frictionless_wall.yaml" : "scenes/free.yaml");

@@ -11,8 +11,8 @@ namespace proxarm::command_line {
 // Felt inertias (kg m²), load behind the sensor included; absent: no inertia is stable with the session's mass.
 struct SmallestInertias {
   std::optional<double> at_start, everywhere;
-  std::optional<double>
-      with_margins;  // everywhere, with the margins of controller::with_margins for the hand's translation and rotation
+  std::optional<double> with_margins;  // as `everywhere`, with the margins of controller::with_margins for the hand's
+                                       // translation and rotation
 };
 // Precondition: the session has a turned_model().
 SmallestInertias smallest_inertias(const PreparedSession& session);

@@ -64,7 +64,7 @@ std::string end_of(const controller::Supervisor& supervisor) {
   return supervisor.held_for().fault == Fault::none ? "" : controller::fault_name(supervisor.held_for().fault);
 }
 
-// The simulated arm with the body and stop of a trial. It observes the arm on the hand's clock.
+// The simulated arm of a trial, with the trial's body and stop. Observed times count from the hand's start.
 class TrialArm {
  public:
   TrialArm(const PreparedSession& session, const assessment::Trial& trial)

@@ -46,7 +46,7 @@ struct Fixed {
 // mm in a case, that case counts as a thousand times the time of its best-tuned method.
 Fixed best_fixed(const RunsByCase& all);
 
-// Its runs for a case, which may have fewer parameters to tune; nullptr if there are none.
+// The fixed method's runs for a case, which may have fewer parameters to tune; nullptr if there are none.
 const Runs* fixed_runs(const std::vector<Runs>& list, const Fixed& fixed);
 
 // The best penalty method for 0.1 mm.
@@ -57,7 +57,7 @@ const Runs& best_tuned(const std::vector<Runs>& list);
 Spread speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals);
 Spread speedup_over(const Runs& ours, const Runs& rival);
 
-// The run with steps of 1 ms and the tuning that gives a method's smallest error there. Infinite if no run ends.
+// A method's run with steps of 1 ms, with the tuning that errs least there. The error is infinite if no run ends.
 struct AtOneMs {
   double error_m = 0.0, step_ns = 0.0;
 };

@@ -1,4 +1,4 @@
-// The world as springs, dampers and friction dampers, which replaces ℳ in the error study's penalty methods.
+// The world of the error study's penalty methods, in place of ℳ: springs, dampers and friction dampers.
 //
 // A wall pushes in proportion to the depth and to the speed into it, and never pulls; friction is a damper up to μ f_n.
 // Distances, normals and derivatives of the plane or sphere are in closed form, so a step does no unnecessary work.

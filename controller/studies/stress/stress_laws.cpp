@@ -40,8 +40,8 @@ double convex_distance(const scenes::Object& object, const Vec3& x) {
   return highest;
 }
 
-// Slipping contacts may nearly press against each other with forces far larger than f, and the rounding of their axes
-// is multiplied by these. Returns the sum of the forces, N, if each contact bears one along a line, else 0.
+// If slipping contacts press against each other, their forces may far exceed f, and the rounding of their axes is
+// multiplied by these forces. Returns the sum of the forces (N) if each contact bears one along its axis, else 0.
 double squeeze(const Vec3& f, const std::vector<models::ForceCone>& cones) {
   if (cones.size() < 2 || cones.size() > 3) return 0.0;
   Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();
