@@ -6,11 +6,11 @@
 // at which it is 0. A point is ill-conditioned if 1 % of the hand's stiffness moves the boundary by 3 % or more (|∂ln
 // M/∂ln K_h| ≥ 3).
 //
-// At every tenth point the hand also pushes the proxy against a wall, where it may settle, bounce for ever, or diverge.
-// Order 2 steps by (26) at contacts, so the larger of the two stable masses counts there. Eigenvalues don't include
-// impacts: the hand's mass m_h answers one with a pulse of size m_h/M, which returns after the loop's delay, and with
-// m_h/M near 1 the next impact adds to the rest of it. So simulation finds the multiple of the smallest mass from
-// which on bouncing doesn't grow.
+// At every tenth point the hand also pushes the proxy against a wall, where it may settle, bounce without end, or
+// diverge. Order 2 steps by (26) at contacts, so the larger of the two stable masses counts there. Eigenvalues don't
+// include impacts: the hand's mass m_h answers one with a pulse of size m_h/M, which returns after the loop's delay,
+// and with m_h/M near 1 the next impact adds to the rest of it. So simulation finds the multiple of the smallest mass
+// from which on bouncing doesn't grow.
 #pragma once
 
 #include "controller/stability/stability.hpp"

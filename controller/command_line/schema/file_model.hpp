@@ -44,7 +44,7 @@ struct Alternative {
 struct KeyCase {
   std::vector<Condition> when{};  // all must hold
   Standing standing = Standing::optional;
-  std::vector<description::Json> otherwise{};  // default: one, or several among which other keys choose
+  std::vector<description::Json> otherwise{};  // the default; several if other keys choose among them
   std::vector<Alternative> value{};
   bool is_wide = false;  // defaults for such maps may set its keys elsewhere, so no key is required here (wide_map.hpp)
 };

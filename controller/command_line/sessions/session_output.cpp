@@ -94,8 +94,8 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   writer_->write_file("effective.yaml", effective_config(session));
 }
 
-// Refuses a bad plot file before the run instead of after it. The required name keeps --plot from overwriting anything
-// but an earlier plot.
+// Refuses a bad plot file before the run instead of after it. The file must end in .svg, so --plot can overwrite
+// nothing but a picture.
 void SessionOutput::refuse_lost_plot() const {
   const fs::path& file = options_.plot_file;
   if (file.empty()) return;

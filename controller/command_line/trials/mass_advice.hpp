@@ -12,7 +12,7 @@ namespace proxarm::command_line {
 // controller::with_margins: also for a stiffer and heavier hand, and for a longer delay.
 std::optional<double> smallest_with_margins(const controller::HandModel& hand, const controller::LoopModel& loop);
 
-// Returns the least of controller::tried_dampings with which the mass with margins is at most half of that without
+// Returns the least of controller::tried_dampings with which the mass with margins is at most half of the mass without
 // damping; nullopt if there is none. It is at most 20 Ns/m: at 0.2 m/s that is 4 N, which a hand takes for a heavier
 // handle.
 inline constexpr double most_for_comfort_Ns_per_m = 20.0;

@@ -37,8 +37,8 @@ double error_of(Over over, const Runs& runs, std::size_t i) {
   return over == Over::run_time ? runs.error[i].high : runs.error[i].median;
 }
 
-// Number of the coarsest runs that are exact although a finer run errs by more than ten times rounding. Their steps end
-// by chance where all methods are exact, which says nothing about the method.
+// Number of coarse runs that are exact by chance: a finer run errs by more than ten times rounding. Their steps happen
+// to end where all methods are exact, which says nothing about the method.
 std::size_t lucky_runs(const Runs& ours, Over over) {
   std::size_t lucky = 0;
   double worst_finer = 0.0;

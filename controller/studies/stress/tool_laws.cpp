@@ -570,9 +570,9 @@ double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& e
     const auto met = [&](const PoseContact& was) {
       return was.object == contact.object && was.normal_W.dot(way) <= bent_m && cosine_of(was) > 0.0;
     };
-    // A normal turns locally, so earlier contacts with this object are used only if they are as near as the point may
-    // have come from, if there are such. (Replay 2305703389568219, step 172: one edge of the tool moves from a mesh's
-    // face to the next face's edge, while other edges already lie on that face elsewhere.)
+    // A normal turns locally, so of the earlier contacts with this object only those near enough for the point to have
+    // come from are used; if there are none, all are used. (Replay 2305703389568219, step 172: one edge of the tool
+    // moves from a mesh's face to the next face's edge, while other edges already lie on that face elsewhere.)
     const auto came = [&](const PoseContact& was) {
       return met(was) && (was.point_W - contact.point_W).norm() <= 2.0 * s;
     };

@@ -56,10 +56,10 @@ class ToolLaws {
   // Precondition: the scene outlives the laws.
   ToolLaws(const scenes::Scene& scene, const models::Tool& tool);
 
-  // Depth of the tool inside the objects, m; if negative, a lower bound of the distance.
+  // Depth of the tool inside the objects, m. If negative, the tool is at least that far away from them.
   [[nodiscard]] double depth_m(const models::ToolPose& pose, double time_s = 0.0) const;
 
-  // Sets the call's q as moved with each object.
+  // Sets the call's `with`: q moved with each object.
   void carry(ToolCall& call) const;
   // Returns the contacts moved with their objects from since_s to time_s.
   [[nodiscard]] std::vector<models::PoseContact> carried(std::vector<models::PoseContact> contacts, double since_s,
