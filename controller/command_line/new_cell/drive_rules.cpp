@@ -30,7 +30,7 @@ constexpr double fastest_rad_per_s = 4.0, fastest_m_per_s = 1.0, usual_rad_per_s
 
 struct Load {
   double mean_inertia = 0.0, most_inertia = 0.0, most_gravity = 0.0;
-  double most_lever = 0.0;  // of a force at the tool, m; 1 for a joint that slides
+  double most_lever = 0.0;  // lever of a force at the tool, m; 1 for a joint that slides
 };
 
 std::vector<Load> loads_of(const models::Arm& arm) {

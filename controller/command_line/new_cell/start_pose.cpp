@@ -17,15 +17,15 @@ using models::JointVector;
 using models::Vec3;
 
 constexpr int poses = 20000;
-constexpr std::size_t tried = 2000;  // of them, for the hand's path
+constexpr std::size_t tried = 2000;  // poses for which the hand's path is tried
 // Step along that path, per metre of reach up to one; shorter than one call of the inverse kinematics can follow.
 constexpr double step_share = 2e-3;
 // Closer to an axis than this the tool counts as on it: turning about the axis doesn't move the tool.
 constexpr double at_an_axis_m = 1e-3;
 // The least reach for which steps are chosen: with a smaller one the path would take thousands of steps.
 constexpr double smallest_circle_m = 0.05;
-constexpr double another_rad = 0.3;  // m for a joint that slides: half of a hand's path
-constexpr double least_share = 0.4;  // of the start's smallest singular value, anywhere on the path
+constexpr double another_rad = 0.3;  // between two starts; for a joint that slides m, half of a hand's path
+constexpr double least_share = 0.4;  // required share of the start's smallest singular value, anywhere on the path
 
 // Distance of the joint nearest to its end: 0 at an end of its range, 1 in the middle.
 double room(const models::Arm& arm, const JointVector& q) {

@@ -46,8 +46,8 @@ class Specimens {
   Specimens(const std::filesystem::path& folder, const std::string& kind);
 
   [[nodiscard]] const std::vector<const Place*>& roots() const noexcept { return roots_; }
-  // Returns the comment of the key with this path, else of the key whose path agrees in the most names from its end
-  // (the first such key). Empty if there is none.
+  // Returns the comment of the key with this path, else of the first key whose path agrees in the most names, counted
+  // from its end. Empty if there is none.
   [[nodiscard]] std::string meaning(const std::string& path, const std::string& key) const;
   // Returns the keys on which this key depends: its comment may begin with "(by KEY, KEY)".
   [[nodiscard]] std::vector<std::string> deciders(const std::string& path, const std::string& key) const;

@@ -56,7 +56,8 @@ std::string cells_of(const Map& map) {
   return cells.str().empty() ? "1 1 1 1 1 1 nan\n" : cells.str();
 }
 
-// Sets everything of a map except its cells. `first`, `lowest`: in its row, in its column.
+// Sets everything of a map except its cells. `first`: it is the first in its row; `lowest`: it is the last in its
+// column.
 void set_map(std::ostream& gp, const MapChart& chart, const Map& map, bool first, bool lowest) {
   for (const auto& [axis, grid] : {std::pair{'x', &map.x}, std::pair{'y', &map.y}}) {
     gp << "set logscale " << axis << "\nset " << axis << "range [" << edge(*grid, 0, -1.0) << ":"

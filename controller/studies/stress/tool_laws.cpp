@@ -18,12 +18,12 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-constexpr double kSlips_m = 1e-9;   // a million roundings of a displacement
-constexpr double kShort_m = 1e-12;  // of a gap
+constexpr double kSlips_m = 1e-9;   // smallest slip that must be reported: a million roundings of a displacement
+constexpr double kShort_m = 1e-12;  // largest amount by which a gap may fall short of 0
 constexpr double beyond_all_m = std::numeric_limits<double>::infinity();
 
-// The least of a distance along a segment, by golden-section search; if that is `enough` or more, any bound of at least
-// `enough`. The distance is convex and changes by at most the length moved.
+// The least distance f along a segment, by golden-section search; if it is at least `enough`, returns some lower bound
+// that is at least `enough`. Precondition: f is convex and changes by at most the length moved.
 template <typename Distance>
 double least_along(const Vec3& a, const Vec3& b, Distance f, double enough = beyond_all_m) {
   if (a == b) return f(a);

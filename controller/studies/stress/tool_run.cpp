@@ -25,7 +25,7 @@ using models::Twist;
 using models::Vec3;
 
 constexpr int steps_per_run = 1000;
-constexpr double most_m = 0.05, most_rad = 0.3, furthest_m = 2.0;  // of a step; from the origin
+constexpr double most_m = 0.05, most_rad = 0.3, furthest_m = 2.0;  // largest step; largest distance from the origin
 constexpr double lever = ToolLaws::lever_m;
 
 Twist levers() {
