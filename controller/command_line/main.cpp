@@ -499,7 +499,6 @@ class Commands {
         ->type_name("BASE_ID");
   }
 
-  // Changes and orders to a running session, each sent as a line to its socket.
   void add_orders() {
     constexpr const char* control_text = "the session's socket, where `proxarm run --control PATH` isn't \"default\"";
     CLI::App* set = add(

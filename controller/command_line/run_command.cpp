@@ -64,7 +64,6 @@ PreparedSession prepared_arm(const PreparedSession& session, RunOptions options)
                                  .expected = "the same: a wrong direction, gear, link or sensor is what it is for"});
 }
 
-// Sets the other options that the view needs.
 RunOptions with_view(RunOptions options) {
   options.view = options.view || options.view_control;
   if (options.view_control && options.control.empty()) options.control = view_control_path();

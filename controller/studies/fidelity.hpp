@@ -23,7 +23,6 @@ struct ArmSine {
   double frequency_Hz = 1.0, amplitude = 0.0;  // amplitude in m, or in rad if the hand turns the tool
 };
 
-// A session of the fidelity study.
 struct ArmSetup {
   std::string cell = "default";  // name in models/cells
   double mass_kg = 4.0;

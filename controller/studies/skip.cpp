@@ -290,7 +290,6 @@ CostByCount costs_of(const Table& table, const char* kind) {
 
 std::string ns_text(double ns) { return count_text(ns) + " ns"; }
 
-// Three curves, each named beside it, with rings at the largest world and at the slowest step.
 Panel cost_panel(const CostByCount& costs, const char* title, const char* what) {
   Panel panel{.title = title,
               .x_label = std::string("number of ") + what,

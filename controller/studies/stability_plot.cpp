@@ -39,7 +39,6 @@ class Points {
   [[nodiscard]] bool is_drawn(std::size_t row) const {
     return table_.number(row, order_) == drawn_order && table_.number(row, drive_) == drawn_drive_s;
   }
-  // All values of a column among the drawn points.
   [[nodiscard]] std::vector<double> grid(const char* name) const {
     std::set<double> values;
     for (std::size_t row = 0; row < table_.rows(); ++row) {
@@ -141,7 +140,6 @@ MapChart stability_chart(const Table& table) {
   return chart;
 }
 
-// A point whose measured and predicted smallest mass were compared.
 struct Compared {
   double sensitivity, error;
 };

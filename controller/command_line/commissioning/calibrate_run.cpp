@@ -89,7 +89,6 @@ std::vector<double> motor_angles(const description::Cell& cell, const std::vecto
   return {motor.data(), motor.data() + motor.size()};
 }
 
-// The simulated arm starts in the pose that is asked for.
 MarkedPose pose_of_simulated(const PreparedSession& session, const PreparedSession& arm,
                              const std::vector<double>& angle_rad) {
   description::Cell cell = arm.cell;

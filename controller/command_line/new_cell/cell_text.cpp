@@ -38,7 +38,6 @@ std::string pose(const description::PoseDescription& X) {
   return "{position_m: " + list(X.position_m) + ", rpy_rad: " + list(X.rpy_rad) + "}";
 }
 
-// Keys and their values.
 using Keys = std::vector<std::pair<std::string, std::string>>;
 
 // Keys that drives usually have in common, and those of their `simulation` maps.

@@ -8,8 +8,8 @@
 
 namespace proxarm::command_line {
 
-// Writes the keys that a new cell needs, with what to look up for a real arm. Files are named relative to the cell.
-// `remarks` become comments at the top.
+// The text has the keys that a new cell needs, with what to look up for a real arm. Files are named relative to the
+// cell. `remarks` become comments at the top.
 std::string cell_text(const description::Cell& cell, const std::vector<std::string>& remarks, bool with_scene,
                       const std::string& sensor_keys);
 

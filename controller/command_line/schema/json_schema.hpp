@@ -12,7 +12,6 @@ namespace proxarm::command_line {
 description::Json schema_of(const std::vector<Alternative>& value);
 description::Json schema_of(const MapModel& map);
 
-// The schema of the whole file, with its title.
 description::Json schema_of_file(const MapModel& root, const std::string& kind);
 
 }  // namespace proxarm::command_line

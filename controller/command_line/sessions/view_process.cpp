@@ -72,7 +72,7 @@ bool send_line(int line, const Json& value) {
   return send(line, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
 }
 
-// Reads a line; empty if none comes in time.
+// Empty if no line comes in time.
 std::string read_line(int line) {
   std::string text;
   for (char letter = 0; letter != '\n'; text += letter) {

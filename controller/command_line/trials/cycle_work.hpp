@@ -11,7 +11,6 @@ namespace proxarm::command_line {
 // Counts over a session on the simulated arm. Throws SetupError if the session can't begin.
 controller::MotionWork count_work(const PreparedSession& session);
 
-// The counts in words, a line for each stage.
 std::string work_text(const PreparedSession& session, const controller::MotionWork& work);
 
 }  // namespace proxarm::command_line

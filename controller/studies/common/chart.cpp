@@ -46,7 +46,6 @@ void set_axis(std::ostream& gp, char axis, double low, double high, bool log, co
 
 constexpr std::size_t name_width = 9;  // letters
 
-// Writes names below the axis, in one or more lines each.
 void name_places(std::ostream& gp, const std::vector<std::string>& names) {
   gp << "set xtics (";
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -55,7 +54,6 @@ void name_places(std::ostream& gp, const std::vector<std::string>& names) {
   gp << ") font ',15'\nset xrange [-0.5:" << static_cast<double>(names.size()) - 0.5 << "]\n";
 }
 
-// Draws shaded spans and straight lines behind a panel's curves, with their texts.
 void draw_grounds(std::ostream& gp, const Panel& panel, int& label) {
   int number = 0;
   for (const Span& span : panel.x_spans) {
@@ -85,7 +83,6 @@ void draw_grounds(std::ostream& gp, const Panel& panel, int& label) {
   }
 }
 
-// Draws a note's text beside its point, on the page's background.
 void draw_note(std::ostream& gp, const Note& note, int label) {
   struct Placed {
     const char *align, *offset;
@@ -164,7 +161,6 @@ std::vector<std::string> key_entries(const Chart& chart, std::size_t& longest) {
 
 constexpr double key_line = 24.0;
 
-// The frames of all panels, and the key's place below them.
 struct Layout {
   std::vector<Frame> frames;
   double key_top = 0.0, height = 0.0;

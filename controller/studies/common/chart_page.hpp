@@ -30,7 +30,7 @@ std::size_t letters(const std::string& text);
 // "'#17202a'": a colour of the palette on white, for gnuplot's rgb.
 std::string rgb(const char* name);
 
-// Ticks at these places of an axis, 'x' or 'y'.
+// `axis`: 'x' or 'y'.
 void set_ticks(std::ostream& gp, char axis, const std::vector<double>& places);
 
 struct Frame {

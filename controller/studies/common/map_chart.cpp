@@ -107,7 +107,6 @@ void set_scale(std::ostream& gp, const Scale& scale) {
   gp << ")\n";
 }
 
-// Where the maps are on the page.
 struct MapLayout {
   std::size_t columns, rows;
   double top, width, frames_end;
@@ -127,7 +126,6 @@ struct MapLayout {
   }
 };
 
-// One scale of colours for all maps, below its label.
 void place_scale(std::ostream& gp, const MapChart& chart, const Page& page, const MapLayout& layout) {
   gp << "set label 1101 " << plain(chart.z_label) << " at screen "
      << page.screen_x(chart.width - 0.5 * scale_width - 4.0) << ", screen " << page.screen_y(layout.top - 18.0)

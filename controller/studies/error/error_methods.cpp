@@ -154,7 +154,6 @@ class Penalty {
   SampledVelocity sampled_{Vec3::Zero()};
 };
 
-// The errors of a run that starts at t_0.
 template <typename Stepper>
 Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps, double t_0) {
   const int per_instant = std::max(1, steps / instants), compared = steps / per_instant;

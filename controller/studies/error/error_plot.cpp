@@ -83,7 +83,6 @@ Curve rivals_over_run_time(const std::vector<Runs>& list) {
   return curve;
 }
 
-// The least error of all other methods at each timestep.
 Curve rivals_over_timestep(const std::vector<Runs>& list) {
   std::map<double, double> least;
   for (const Runs& runs : list) {
@@ -184,7 +183,7 @@ std::string in_words(const ErrorCase& which) {
   return name;
 }
 
-// One panel for all motions: how many times as fast order 2 is, above or below the line at 1.
+// How many times as fast order 2 is, above or below the line at 1, in one panel for all motions.
 Panel verdict_panel(const RunsByCase& all) {
   Panel panel{.title = "How many times as fast order 2 is as the best of the others, for the same error",
               .y_label = "times as fast",
@@ -257,14 +256,12 @@ std::string short_title(Method method) {
   return title.substr(title.find(", ") + 2);
 }
 
-// States the step times of order 2 and of the best penalty method.
 std::string step_answer(const RunsByCase& all) {
   const Method rival = best_penalty(all);
   return "A step of order 2 takes " + nanoseconds(worst_of(all, order_2)) + ", of " + short_title(rival) + " " +
          nanoseconds(worst_of(all, rival));
 }
 
-// The place of a method's mark among those of a motion.
 double place_of(std::size_t motion, std::size_t method) {
   return static_cast<double>(motion) + 0.13 * (static_cast<double>(method) - 2.5);
 }

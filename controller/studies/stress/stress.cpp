@@ -59,7 +59,6 @@ json failing(const Table& table) {
   return runs;
 }
 
-// The meanings of the headline's figures.
 json keys(const std::string& study) {
   return {
       {"runs", "worlds, each with a proxy of its own; a run that found no free place has no steps"},

@@ -20,7 +20,6 @@
 
 namespace proxarm::studies {
 
-// One call of 𝒢.
 struct ToolCall {
   models::Mat6 K;
   double stiffest = 0.0;  // K's largest eigenvalue with rotations scaled by lever_m; N/m
