@@ -46,7 +46,7 @@ void refuse_for_interfaces(const RunOptions& options) {
 
 namespace {
 
-// What is simulated: the session's own cell, or another one that is wired as it is.
+// Returns the simulated arm: the session's own cell, or another cell with the same wiring.
 PreparedSession prepared_arm(const PreparedSession& session, RunOptions options) {
   if (options.arm.empty()) return session;
   options.cell = options.arm;
@@ -64,7 +64,6 @@ PreparedSession prepared_arm(const PreparedSession& session, RunOptions options)
                                  .expected = "the same: a wrong direction, gear, link or sensor is what it is for"});
 }
 
-// What the view asks for of the other options.
 RunOptions with_view(RunOptions options) {
   options.view = options.view || options.view_control;
   if (options.view_control && options.control.empty()) options.control = view_control_path();

@@ -23,8 +23,8 @@ using controller::Cycle;
 using controller::CycleRecord;
 using SteadyClock = std::chrono::steady_clock;
 
-// Virtual time at the pace of the clock on the wall, for somebody who looks: each cycle waits until it is due. It is
-// never late, so nothing is left out, and what is commanded is the same to the bit as without.
+// Makes virtual time keep pace with the wall clock, for viewers: each cycle waits until it is due. No cycle is skipped,
+// and the setpoints are the same to the bit as without waiting.
 class Spectator {
  public:
   explicit Spectator(bool looks) : looks_(looks) {}
@@ -43,7 +43,7 @@ class Spectator {
   SteadyClock::time_point begun_;
 };
 
-// For the last frames to get onto the wire and to the drives: the longest queue of a cycle is through in a millisecond.
+// Time for the last frames to reach the drives: the longest queue of a cycle takes a millisecond.
 constexpr std::int64_t last_words_ns = 5'000'000;
 constexpr std::size_t record_capacity = 64;  // drained after every cycle
 
@@ -112,7 +112,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
                                          }
                                        },
                                        [&] { drain(cycle.records()); }};
-  if (options_.pace == Pace::realtime) network_.follow_real_time();  // now: what went before was no cycle's
+  if (options_.pace == Pace::realtime) network_.follow_real_time();  // from now on: earlier time belongs to no cycle
   const controller::SessionTally tally =
       controller::run_session(cycle, network_, session_length(session_, options_), hooks);
   if (exploded_at_ns_) controller::refuse_explosion(1e-9 * static_cast<double>(*exploded_at_ns_ - power_on_ns_));
