@@ -1,14 +1,14 @@
 // The arm's kinematics, statics and dynamics for given joint angles: poses, Jacobian, gravity, masses, elastic gears.
 //
-// Built from a cell: in the URDF, a chain of revolute or prismatic joints must lead from the root to the sensor's link,
-// with one drive of the cell for each joint. Joint vectors are in the order of the cell's drives, in rad, Nm and kg m²
-// at the joint (after the gear).
+// In the URDF, a chain of revolute or prismatic joints must lead from the root to the sensor's link, with one drive of
+// the cell for each joint. Joint vectors are in the order of the cell's drives, in rad, Nm and kg m² at the joint
+// (after the gear).
 //   W ─X_WB─ B ─ joints ─ L (link that carries the sensor) ─X_LS─ S ─X_ST─ T
 // MuJoCo reads the URDF. The recursions below are our own: a fixed serial chain needs no more.
 //
 // Const functions neither allocate, lock nor throw, and several threads may call them in each cycle. Precondition:
 // vectors have the size axes(). Finite angles give finite results (but see effective_mass_range), NaN gives NaN;
-// callers check their angles, as InverseKinematics does.
+// callers check their angles.
 #pragma once
 
 #include <array>

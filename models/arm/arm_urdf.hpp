@@ -1,9 +1,9 @@
 // Reads a URDF into a MuJoCo model, avoiding some of MuJoCo's defaults.
 //
 // By default MuJoCo 2.2.2 fuses links that are fixed to each other (the flange disappears), silently ignores <mimic>,
-// and opens mesh files. So this reader parses the file first. It refuses <mimic>. It drops shapes, which kinematics and
-// dynamics don't need; each moving link must state its <inertial>. It adds compiler settings that keep every link, in
-// memory only, and reports mistakes with file and line. For set-up.
+// and opens mesh files. So this reader parses the file first. It refuses <mimic>, drops shapes, and adds settings that
+// keep every link, in memory only. Each moving link must state its <inertial>. Mistakes are reported with file and
+// line. For set-up.
 #pragma once
 
 #include <filesystem>

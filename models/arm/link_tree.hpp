@@ -1,8 +1,8 @@
 // The shapes and poses of an arm's links, for pictures; never for control.
 //
-// Reads the URDF a second time, without MuJoCo: all links, including those without a moving joint, with their <visual>
-// shapes. A shape that can't be drawn (unknown to URDF, or a mesh file of another format) is left out and named in
-// notes(): an incomplete picture is better than none.
+// Reads the URDF a second time, without MuJoCo: all links, with their <visual> shapes. A shape that can't be drawn
+// (unknown to URDF, or a mesh file of another format) is left out and named in notes(): an incomplete picture is better
+// than none.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// Mass and inertia of everything behind the force sensor, about the rendered point T along T's axes. The sensor can't
-// measure the hand's part of this inertia, so the hand feels it in full, whatever the controller renders.
+// Mass and inertia of everything behind the force sensor, about the rendered point T along T's axes. The force that
+// accelerates it doesn't reach the sensor, so the hand feels this inertia in full, whatever the controller renders.
 #pragma once
 
 #include "models/description/cell.hpp"

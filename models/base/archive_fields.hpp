@@ -3,9 +3,9 @@
 //   struct State { double angle_rad = 0.0; models::Vec3 q_W = models::Vec3::Zero(); };
 //   void archive(StateArchive& state) noexcept { archive_fields(state, state_); }
 //
-// It counts the members by the number of initialisers that the aggregate accepts, and names them by a structured
-// binding of that size. Members are types that StateArchive accepts, or plain structs. No base classes, no C arrays, at
-// most 16 members: a larger struct should be split.
+// The number of initialisers that the aggregate accepts counts the members; a structured binding of that size names
+// them. Members are types that StateArchive accepts, or plain structs. No base classes, no C arrays, at most 16
+// members.
 #pragma once
 
 #include <cstddef>

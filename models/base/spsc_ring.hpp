@@ -1,8 +1,8 @@
 // A lock-free queue between two threads: one pushes (the cycle), one pops (a writer of files).
 //
-// The constructor allocates the fixed capacity; nothing else allocates. push() to a full ring drops the item and counts
-// it, so the cycle never waits for a disk. The two indices are on separate cache lines, and each side keeps a copy of
-// the other's index. So push and pop read the other's line only if the copy says full or empty.
+// Only the constructor allocates. push() to a full ring drops the item and counts it, so the cycle never waits for a
+// disk. The two indices are on separate cache lines, and each side keeps a copy of the other's index. So push and pop
+// read the other's line only if the copy says full or empty.
 #pragma once
 
 #include <atomic>

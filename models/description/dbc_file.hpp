@@ -1,13 +1,12 @@
 // Reads messages and signals of a DBC file, the automotive industry's format: the place and scale of each number in a
 // frame.
 //
-// Reads the sections that a sensor needs: BO_ (message), SG_ (signal), SIG_VALTYPE_ (float) and long names in BA_.
-// Skips other sections unchecked. Debian 12 packages no DBC parser for C++, and this part of the format is a flat list
-// of words, so a small strict reader is less code than a grammar library. An error in a message or its signals (bad
-// syntax, a signal that doesn't fit its message, a repeated name) is noted with its line and reported only to users of
-// that message. Refused: bad syntax elsewhere, and files above 4 MiB, 4096 messages, or 512 signals in a message.
-// Nothing nests, so depth needs no limit. Some editors keep unassigned signals in a pseudo-message (identifier
-// C0000000h, or by its name), which is skipped.
+// Reads BO_ (message), SG_ (signal), SIG_VALTYPE_ (float) and long names in BA_; skips other sections unchecked. Debian
+// 12 packages no DBC parser for C++, and for this flat list of words a small strict reader is less code than a grammar
+// library. An error in a message or its signals (bad syntax, a signal that doesn't fit, a repeated name) is noted with
+// its line and reported only to users of that message. Refused: bad syntax elsewhere, and files above 4 MiB, 4096
+// messages, or 512 signals in a message. Skipped: the pseudo-message (identifier C0000000h, or by its name) in which
+// some editors keep unassigned signals.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +23,7 @@ struct DbcSignal {
   std::string name;
   std::string long_name;  // the full name if an editor cut it to 32 characters; otherwise empty
   NumberField number;     // bytes relative to its frame
-  int length = 0;         // bits as stated; signals above 32 bits are skipped: number.bits is then 32
+  int length = 0;         // bits as stated; a signal of more than 32 can't be used, and number.bits is then 32
   bool multiplexed = false;
   double factor = 1.0, offset = 0.0;
   std::string unit;

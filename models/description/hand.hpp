@@ -3,13 +3,12 @@
 // The hand holds the tool's point T through stiffness and damping and follows its intention: waypoints, joined by
 // minimum-jerk motions, plus a sum of sines. With s = (t − t_i)/(t_{i+1} − t_i) in [0, 1]:
 //   x(t) = x_i + (x_{i+1} − x_i)(10 s³ − 15 s⁴ + 6 s⁵) + Σ_j a_j d_j sin(2π f_j t + φ_j)
-// It holds and leads the tool's orientation in the same way: the intention is a rotation vector in W, from the
-// orientation at the start. Without turning stiffness and damping the hand doesn't twist the handle. Before the first
-// waypoint's time it rests there, after the last one's at the last. Without waypoints it holds the start.
+// It holds and leads the tool's orientation in the same way, by a rotation vector in W from the orientation at the
+// start. Without turning stiffness and damping the hand doesn't twist the handle. It rests at the first waypoint before
+// that waypoint's time, at the last one after its time, and at the start without waypoints.
 //
-// CSV files may replace both: a trajectory instead of waypoints, and a force in addition to the grip's. A hand with a
-// force and nothing to follow has no grip unless its file states one: it then exerts exactly that force, wherever the
-// tool goes.
+// CSV files may give a trajectory instead of waypoints, and a force in addition to the grip's. A hand with a force and
+// nothing to follow has no grip unless its file states one: it then exerts exactly that force, wherever the tool goes.
 #pragma once
 
 #include <array>

@@ -7,9 +7,9 @@
 //   DCF only:      ParameterValue of an object, [1400Value] of compact ones, [DeviceComissioning] (sic) NodeID
 // Values relative to $NODEID are known only in a DCF, which names its node.
 //
-// Makers' files deviate from the standard, mostly in objects that the controller doesn't use. So a mistake in an object
-// is stored with it, and only code that needs this object refuses it. An unreadable default counts as unknown.
-// `remarks` lists all mistakes. Values that a DCF sets must be readable.
+// Makers' files deviate from the standard, mostly in unused objects. So a mistake in an object is stored with it, and
+// only code that needs the object refuses it. `remarks` lists all mistakes. An unreadable default counts as unknown,
+// but values that a DCF sets must be readable.
 #pragma once
 
 #include <cstdint>

@@ -1,9 +1,9 @@
 // Reads INI text as makers write EDS and DCF files: sections and keys in any case, each with its line. Invalid lines
 // don't make the rest unreadable.
 //
-// Boost's reader would refuse the whole file for one free line under [Comments] or one repeated key, and keeps no
-// lines. A byte order mark is skipped; lines that begin with ';' or '#' are comments, and so is the text from a ';'
-// behind a number. Mistakes are reported only to code that asks for the key or the section.
+// Boost's reader would refuse the whole file for one free line or one repeated key, and keeps no lines. Skipped are a
+// byte order mark, lines that begin with ';' or '#', and text from a ';' behind a number. Mistakes are reported only to
+// code that asks for the key or the section.
 #pragma once
 
 #include <cstdint>

@@ -56,7 +56,7 @@ class Json {
   // become null.
   [[nodiscard]] std::string dump(int indent = -1) const;
 
-  // -- reading -- nullopt if the text isn't JSON.
+  // nullopt if the text isn't JSON.
   static std::optional<Json> parse(std::string_view text);
 
   // The value of a key; nullptr if it is missing or this isn't an object.

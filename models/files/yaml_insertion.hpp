@@ -13,8 +13,8 @@ struct YamlStep {
 };
 
 // Inserts `key: value` into the map at the end of `path`, which begins at the file's outermost map. In a block map the
-// key goes after the last key with a plain value on its line; in a map in braces after the first key. Returns false,
-// without a change, if there is no such map, it has the key, or it has no such line.
+// key goes after the last key with a plain value on its line; in a map in braces after the first key. Returns false and
+// changes nothing if there is no such map or line, or if the map has the key.
 [[nodiscard]] bool insert_key(std::string& text, const std::vector<YamlStep>& path, const std::string& key,
                               const std::string& value);
 

@@ -1,9 +1,8 @@
 // A surface of triangles with a bounding-volume tree: which faces are near, which face does a way hit first, how far is
 // the nearest? Built once in double precision, then constant. Queries allocate nothing and may come from any thread.
 //
-// Seen from its front, a face's corners run counter-clockwise; for a body the front is outside. Nothing passes a face
-// in either direction, so a mesh may be open, closed or a soup of triangles: only coordinates count, not how faces are
-// connected.
+// From its front, a face's corners run counter-clockwise; a body's fronts are outside. Nothing passes a face in either
+// direction, so a mesh may be open, closed or a soup of triangles.
 #pragma once
 
 #include <algorithm>
@@ -79,10 +78,10 @@ class TriangleMesh {
     bool closed = false;
   };
 
-  // Vertices with the same coordinates become one. Triangles without area are left out, since they have no sides; in a
-  // mesh without gaps their neighbours cover them. The others are put in the order of a tree of boxes, so that
-  // neighbours in space are neighbours in memory. Throws std::invalid_argument if no triangle is left, an index is out
-  // of range, or a coordinate isn't finite or beyond 1e9 m.
+  // Merges vertices with the same coordinates. Leaves out triangles without area, which have no sides; in a mesh
+  // without gaps their neighbours cover them. Sorts the others so that neighbours in space are neighbours in memory.
+  // Throws std::invalid_argument if no triangle is left, an index is out of range, or a coordinate isn't finite or
+  // beyond 1e9 m.
   explicit TriangleMesh(TriangleSoup soup);
 
   // Restores a mesh from structure() of another one. Throws std::invalid_argument if the structure would lead out of
@@ -117,13 +116,13 @@ class TriangleMesh {
   // How far the surface that a proxy touches is in front of the triangles, metres, so that rounding can't take a proxy
   // in contact through them.
   //
-  // Let S be the largest ‖vertex‖₁. A computed height over the touched surface is off by at most 16 u S (derived at
-  // FlatSurface::rounding: less than 8 u (‖x‖₁ + ‖point‖₁)). The surface's point is rounded by 3 u S, and the error of
-  // its normal (2 u) adds 4 u S over the mesh: 23 u S. A computed height proves a side only if it exceeds doubt(), 32 u
-  // S. Their sum, 55 u S, is rounded up to 64 u S: 2e-14 m for a mesh within one metre.
+  // Let S be the largest ‖vertex‖₁. A computed height over the touched surface is off by at most 16 u S
+  // (FlatSurface::rounding derives less than 8 u (‖x‖₁ + ‖point‖₁)). The surface's point is rounded by 3 u S, and its
+  // normal's error (2 u) adds 4 u S over the mesh: 23 u S. A computed height proves a side only above doubt(), 32 u S.
+  // The sum, 55 u S, is rounded up to 64 u S: 2e-14 m for a mesh within one metre.
   [[nodiscard]] double lift_m() const noexcept { return lift_; }
 
-  // height() is nᵀ(x − corner), m. If it exceeds doubt(), it proves on which side x is.
+  // height() is nᵀ(x − corner), m. If its size exceeds doubt(), it proves on which side x is.
   [[nodiscard]] static double height(const Face& face, const Vec3& x) noexcept {
     return face.normal.dot(x - face.corner);
   }

@@ -12,11 +12,10 @@ namespace proxarm::models {
 //   all pairs with the same three corners.
 // It may visit a pair more than once. Stops if visit() returns false. Precondition: near_m ≥ mesh.lift_m().
 //
-// First walks down the mesh's tree with pairs of nodes and skips pairs whose boxes are apart: enough for most meshes.
-// But around a vertex of many faces, and in a tilted stack, all boxes meet. If too many do, space is divided into cells
-// instead, until each cell has few faces; see CellSearch. That takes n log n for fans, cones and parallel sheets of n
-// faces. It remains quadratic for n large faces of different directions that boxes don't separate, such as nested
-// shells.
+// For most meshes the boxes of the mesh's tree keep faces apart. But around a vertex of many faces, and in a tilted
+// stack, all boxes meet. If too many do, space is divided into cells until each has few faces; see CellSearch. That
+// takes n log n for fans, cones and parallel sheets of n faces. It remains quadratic for n large faces of different
+// directions that boxes don't separate, such as nested shells.
 void each_near_pair(const TriangleMesh& mesh, double near_m,
                     const std::function<bool(std::uint32_t, std::uint32_t)>& visit);
 

@@ -84,9 +84,9 @@ class MeshObstacle final : public Obstacle {
     return surface_.parts(x, y, normal);
   }
   // Let the pose have a translation t, ‖t‖₁ ≤ `size`, and S be as in TriangleMesh::lift_m. A touched point has ‖x‖₁ ≤
-  // √3 S + size in W. On the way to W and back it is rounded by 8 u (‖x‖₁ + ‖t‖₁), and by 10 u √3 S because a rotation
-  // is orthonormal only within rounding. World does this twice: together less than 64 u (S + size). The same amount
-  // again keeps computed heights off the faces.
+  // √3 S + size in W. The way to W and back rounds it by 8 u (‖x‖₁ + ‖t‖₁), and by 10 u √3 S because a rotation is
+  // orthonormal only within rounding. World does this twice: together less than 64 u (S + size). The same again keeps
+  // computed heights off the faces.
   void set_rounding_size(double size_m) noexcept override {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
     surface_.set_lift(3.0 * mesh().lift_m() + 128.0 * u * size_m);

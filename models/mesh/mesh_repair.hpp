@@ -1,9 +1,8 @@
-// Repairs meshes that mean one surface but aren't written as one: corners of neighbours that differ by rounding, and
-// faces that occur more than once.
+// Repairs meshes that mean one surface but aren't written as one: neighbours' corners that differ by rounding, and
+// repeated faces.
 //
 // A proxy falls through any crack. So corners on borders (edges with a face on one side only) that lie within a
-// tolerance become one corner. A corner that isn't on a border is never moved: a closed mesh stays as it is, at any
-// tolerance.
+// tolerance become one corner. Other corners are never moved: a closed mesh stays as it is, at any tolerance.
 #pragma once
 
 #include <cstdint>
@@ -31,21 +30,22 @@ struct RepeatedFaces {
   std::uint64_t opposite = 0;  // left out: another face has the same corners and the opposite front
 };
 
-// Keeps one of the faces with the same three corners and the same front. Faces with both fronts count as one surface
-// too, unless faces with only one front join it somewhere: a wall between two bodies that touch keeps both of its
-// faces. The fronts kept of a double-sided surface agree with each other; on a closed one they are outside.
-// Precondition: as above.
+// Keeps one of the faces with the same three corners and the same front. Faces with both fronts become one as well,
+// unless faces with only one front join their surface somewhere: a wall between two bodies that touch keeps both. The
+// fronts kept of a double-sided surface agree with each other; on a closed one they are outside. Precondition: as
+// above.
 RepeatedFaces leave_out_repeated(TriangleSoup& soup);
 
-// The default distance within which corners count as one. It depends on the last written digit of a text file and on
-// 2⁻¹⁶ of the largest coordinate, both in the file's unit.
+// The default distance within which corners count as one, from the last written digit of a text file and from 2⁻¹⁶ of
+// the largest coordinate, both in the file's unit.
 //
 // Last digit: copies of one corner, each rounded to a digit d, differ by at most d on each axis, √3 d in all. 1.75 d
-// leaves a hundredth of that for the rounding of coordinates in W. A file with short numbers ("v 0 1 0") says nothing
-// about its rounding, so d counts only up to 2⁻¹⁰ of the largest coordinate. 2⁻¹⁶: most mesh programs compute in single
-// precision, with an error of 2⁻²⁴ of the largest coordinate for each operation. If a corner is computed separately for
-// each of its faces, by transformations and intersections of some tens of operations each, the copies differ by up to
-// 2⁸ of those errors. In a part of 0.1 m about the origin that is 1.5 µm. Smaller: cracks of such programs stay open.
+// leaves a hundredth of that for rounding in W. A file with short numbers ("v 0 1 0") says nothing about its rounding,
+// so d counts only up to 2⁻¹⁰ of the largest coordinate.
+//
+// 2⁻¹⁶: most mesh programs compute in single precision, with an error of 2⁻²⁴ of the largest coordinate per operation.
+// If they compute a corner separately for each of its faces, by some tens of operations, the copies differ by up to 2⁸
+// of those errors. In a part of 0.1 m about the origin that is 1.5 µm. Smaller: cracks of such programs stay open.
 // Larger: intended slits are closed.
 double default_weld(double largest_coordinate, double last_digit) noexcept;
 

@@ -1,24 +1,23 @@
 // 𝒢 of a triangle mesh with friction, for a proxy that is a point.
 //
 // The proxy moves from q along straight pieces that touch no triangle. Each piece is tested exactly
-// (mesh_predicates.hpp) against all faces that could be near, so the proxy can't pass the surface, however irregular
-// the mesh is. The pieces lead:
+// (mesh_predicates.hpp) against all near faces, so the proxy can't pass the surface, however irregular the mesh is. The
+// pieces lead:
 //   1. towards p. If this way is free, the step ends at p.
 //   2. otherwise, from the place where the way is blocked, towards the point at which the touched faces hold the proxy:
 //        one face     (4), with q projected onto the face's plane even if q is over another face: v in (17) is the
 //                     whole step's, (q(k) − q(k−1))/T
 //        two faces    solve_groove, in a groove and on a convex edge
 //        three faces  solve_corner
-//      The first complete set counts (contact_search.hpp): no contact pulls and the way is free. Fewer faces come
-//      first, then the point nearest to p.
-//   3. over an edge of the face: the walk goes on from there with the faces around. If a piece meets another face,
-//      that face joins the touched ones.
+//      The first complete set counts (contact_search.hpp). Fewer faces come first, then the point nearest to p.
+//   3. over an edge of the face: the walk continues with the faces around. If a piece meets another face, that face
+//      joins the touched ones.
 // If no set of faces is complete, the proxy is held where it is (a vertex can do that).
 //
 // The surface on which the proxy glides is in front of the triangles by the lift (TriangleMesh::lift_m): 2e-14 m for a
-// mesh within one metre, some units in the last place. Exact sides and heights within a few lifts decide whether a face
-// is touched. A proxy that is on this surface and sticks is returned bit for bit. K does not appear. Data kept from
-// earlier steps makes a step faster and doesn't change its result.
+// mesh within one metre. Exact sides and heights within a few lifts decide whether a face is touched. A proxy that is
+// on this surface and sticks is returned bit for bit. K does not appear. Data kept from earlier steps makes a step
+// faster and doesn't change its result.
 //
 // Both sides of a face hold: a body is solid for a proxy outside, and a cavity for a proxy inside.
 #pragma once
@@ -56,9 +55,9 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   void set_friction(double friction) noexcept { mu_ = friction; }
 
   // How far the touched surface is in front of the faces, m: TriangleMesh::lift_m(), or more if q and p carry more
-  // rounding than the mesh's coordinates (a moving mesh). After a change the next step brings a proxy from the old
-  // surface to the new one. Precondition of set_lift(): at least TriangleMesh::lift_m(); while a proxy is in contact,
-  // between half and twice the last lift.
+  // rounding than the mesh's coordinates (a moving mesh). After a change, the next step takes the proxy to the new
+  // surface. Precondition of set_lift(): at least TriangleMesh::lift_m(); while a proxy is in contact, between half and
+  // twice the last lift.
   [[nodiscard]] double lift_m() const noexcept { return lift_; }
   void set_lift(double lift_m) noexcept;
 

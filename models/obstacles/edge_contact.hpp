@@ -1,11 +1,10 @@
 // Contact at a convex edge or corner of a solid where friction holds the proxy.
 //
 // A face's plane holds nothing beyond the face's edge. For a proxy that comes from beside an edge, the step on each of
-// the two planes may end beyond that edge, although p is inside. The proxy then meets the edge itself. Its normal is
-// one between the faces' normals, n(θ) = cos θ n₁ + sin θ n₂: the one for which (17), on the plane through the edge,
-// ends on the edge. As θ goes from 0 to 90°, that end moves from beyond the edge on one side to beyond it on the other,
-// so such a θ exists. There may be several (Coulomb's law leaves this open); the one nearest to the entered face is
-// taken.
+// the two planes may end beyond the edge, although p is inside. The edge itself then holds the proxy, with a normal
+// between those of the faces, n(θ) = cos θ n₁ + sin θ n₂: the one for which (17), on the plane through the edge, ends
+// on the edge. From θ = 0 to 90° that end moves from one side of the edge to the other, so such a θ exists. Coulomb's
+// law allows several; the one nearest to the entered face is taken.
 #pragma once
 
 #include <cmath>

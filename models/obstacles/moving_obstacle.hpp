@@ -1,14 +1,13 @@
 // An obstacle that moves by a script or is driven from outside.
 //
-// The object's motion carries the previous proxy along before it serves as q(k−1): in the object's frame q is X(t −
-// T)⁻¹ q, and p is X(t)⁻¹ p. The step happens in that frame, where the object stands still. So friction acts against
-// the relative motion, and the object can sweep onto a resting proxy. This holds for rigid surfaces and for elastic
-// layers.
+// The step happens in the object's frame, where the object stands still. q there is X(t − T)⁻¹ q, carried along by the
+// object's motion, and p is X(t)⁻¹ p. So friction acts against the relative motion, and the object can sweep onto a
+// resting proxy, with rigid surfaces and elastic layers alike.
 //
 // A mesh can't push back a proxy that got behind a face, so rounding between its frame and W must never take the proxy
-// through one. Three measures ensure that. The surface that the proxy touches is in front of the faces by more than
-// this rounding (Obstacle::set_rounding_size). A point in W is returned only after a test of its image in the object's
-// frame. And each step starts, bit for bit, from the pose at which the last step ended.
+// through one. The touched surface is in front of the faces by more than this rounding (Obstacle::set_rounding_size). A
+// point in W is returned only after a test of its image in the object's frame. And each step starts, bit for bit, from
+// the pose at which the last step ended.
 #pragma once
 
 #include <memory>

@@ -1,14 +1,13 @@
 // Can several contacts together bear a force? Tests membership in a sum of circular cones, without iteration.
 //
-// A sticking contact can bear any force of its friction cone. A slipping contact bears only the edge of its cone that
-// points against the motion: a half-line, which is a cone with μ = 0. Together they can bear
+// A sticking contact can bear any force of its friction cone. A slipping contact bears only the edge of its cone
+// against the motion: a half-line, which is a cone with μ = 0. Together they can bear
 //   C = C₁ + C₂ + …,   C_i = {f | ‖f − a_i a_iᵀf‖ ≤ μ_i a_iᵀf}.
 //
 // C is closed unless cones oppose each other. By the separating-hyperplane theorem, f ∈ C ⟺ yᵀf ≥ 0 for all y of the
-// dual cone C* = ∩ C_i*. Each dual is circular about the same axis: C_i* = {y | a_iᵀy ≥ sin β_i ‖y‖}, tan β_i = μ_i. On
-// the unit sphere C* is therefore an intersection of caps. The minimum of yᵀf over C* lies at one of few points: at
-// −f/‖f‖, at the point of one cap farthest from f, or where the edges of two caps meet. So f ∈ C unless one of these
-// points is in all caps and has yᵀf < 0.
+// dual cone C* = ∩ C_i*. Each dual is circular about the same axis: C_i* = {y | a_iᵀy ≥ sin β_i ‖y‖}, tan β_i = μ_i. So
+// on the unit sphere C* is an intersection of caps, and the minimum of yᵀf lies at −f/‖f‖, at the point of one cap
+// farthest from f, or where two caps' edges meet. f ∈ C unless one of these points is in all caps and has yᵀf < 0.
 #pragma once
 
 #include <cmath>

@@ -1,9 +1,9 @@
-// Can the contacts that a 𝒢 reports bear its force? `proxarm check`, the stress study and the contract tests use this
-// to judge forces; the cycle doesn't.
+// Can the contacts that a 𝒢 reports bear its force? For `proxarm check`, the stress study and the contract tests; the
+// cycle doesn't need it.
 //
-// By (17), the force f = K (r − p) must be a sum of one force for each contact: any force of the friction cone of a
-// sticking contact, a force on the cone's edge against N Nᵀ (r − q) of a slipping one. These cones go to
-// in_sum_of_cones (cone_sum.hpp). The caller, who knows its world, chooses how much rounding to forgive.
+// By (17), the force f = K (r − p) must be a sum of forces, one per contact: in the friction cone of a sticking
+// contact, on the cone's edge against N Nᵀ (r − q) of a slipping one. in_sum_of_cones (cone_sum.hpp) tests this; the
+// caller, who knows its world, chooses the tolerance for rounding.
 #pragma once
 
 #include <algorithm>
@@ -32,10 +32,9 @@ double rounding_amplification(std::span<const Contact<N>> contacts) {
   return 4.0 / std::max(least, 1e-8);
 }
 
-// The largest distance that the proxy slid along a contact that is reported to stick, metres. (17) lets such a contact
-// bear any force of its cone because N Nᵀ (r − q) = 0 there, so only this distance reveals a wall that creeps. Skips
-// contacts with no or unknown friction and those that the proxy reached over other faces (Contact::reached). Arguments
-// as for cones_of_contacts().
+// The largest distance (m) that the proxy slid along a contact that is reported to stick. Only this reveals a wall that
+// creeps: (17) lets such a contact bear any force of its cone because N Nᵀ (r − q) = 0 there. Skips contacts with no or
+// unknown friction and those reached over other faces (Contact::reached). Arguments as for cones_of_contacts().
 template <int N, typename Friction, typename Motion>
 double creep_m(std::span<const Contact<N>> contacts, Friction friction, Motion motion) {
   double most = 0.0;

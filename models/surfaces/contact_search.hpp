@@ -1,14 +1,14 @@
 // Which of a few contacts hold the proxy? The active-set search that all worlds share.
 //
 // A step that meets several surfaces ends at a point that one, two or three of them hold together; the others don't
-// act. The search tries sets of contacts by size, single contacts first, until one is complete: no contact pulls,
-// nothing is penetrated, and each contact's friction obeys (17). If a trial runs into a further surface, that surface
-// becomes a candidate and the search starts again. Three rigid contacts determine a point, so larger sets add nothing.
-// Elastic layers share their force by another method (models/world/shared_support.hpp).
+// act. The search tries sets of contacts, the smallest first, until one is complete: no contact pulls, nothing is
+// penetrated, and each contact's friction obeys (17). A surface that a trial runs into becomes a candidate, and the
+// search starts again. Three rigid contacts determine a point, so larger sets add nothing. Elastic layers share their
+// force differently (models/world/shared_support.hpp).
 //
-// The caller solves the trials, which differ from world to world: planes, tangent planes of curved surfaces, faces of a
-// mesh. The order of the sets is the same everywhere: by the candidates' numbers, with the greatest number in the
-// outermost loop. So results depend only on the order of the candidates.
+// The caller solves the trials: on planes, tangent planes of curved surfaces, faces of a mesh. Sets are ordered by the
+// candidates' numbers, with the greatest number in the outermost loop, so results depend only on the order of the
+// candidates.
 #pragma once
 
 #include <cstddef>

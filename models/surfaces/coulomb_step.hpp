@@ -24,8 +24,8 @@ class CoulombStep {
   CoulombStep(GeometricAlgorithm<N>& rest, double kappa, double force_N, const Vec<N>& p, const Vec<N>& q) noexcept
       : rest_(rest), kappa_(kappa), F_(force_N), p_(p), q_(q), d_(q - p), size_(d_.norm()) {}
 
-  // Returns r; rest.contacts() are then its contacts. `found` becomes false if no τ gives F. In that step the medium
-  // takes more or less than F, and r is the last point tried.
+  // Returns r; rest.contacts() are then its contacts. `found` becomes false if no τ gives F. The medium then takes more
+  // or less than F, and r is the sample at which the search for τ ended.
   Vec<N> solve(bool& found) noexcept {
     found = true;
     if (Vec<N> free; goes_free(0, 0, free)) return free;
@@ -96,9 +96,8 @@ class CoulombStep {
   }
 
   // Near rest (τ → 1) the slip is short and the world is flat: r(τ) = q + (1 − τ) R. Extrapolates R to 1 − τ = 0 by
-  // Neville's scheme (Richardson extrapolation). Each sample's 1 − τ is a quarter of the last one's, until R changes by
-  // no more than the rounding of r. `high` becomes the last sample. Returns true if the world is flat from the first
-  // sample on.
+  // Neville's scheme, quartering 1 − τ with each sample until R changes by no more than the rounding of r. `high`
+  // becomes the last sample. Returns true if the world is flat from the first sample on.
   bool extrapolate(Vec<N>& R, Sample& high) noexcept {
     constexpr int most = 14;
     std::array<Vec<N>, most> row;  // by degree: polynomials through the last samples, at 1 − τ = 0

@@ -1,8 +1,7 @@
 // A flat surface through any point of space, and the rounding errors of its heights.
 //
-// The paper's surface contains the origin. Here the surface contains `point`, and heights are relative to it, so that a
-// surface a kilometre away loses only what its coordinates can't hold. The normal has length one within rounding and
-// points to the free side.
+// The paper's surface contains the origin. Here heights are relative to `point`, so that a surface a kilometre away
+// loses only what its coordinates can't hold. The normal has length one within rounding and points to the free side.
 #pragma once
 
 #include <cmath>
@@ -52,10 +51,10 @@ class FlatSurface {
 
   // The height (m) below which rounding can't tell a point from one on the surface.
   //
-  // Coordinates are rounded by u = 2⁻⁵³ of their size. For a point that was meant to be on the surface, the computed
-  // height has an error of at most u ‖x‖ (coordinates) + u ‖x − point‖ (difference) + (N + 1) u ‖x − point‖ (sum). For
-  // N ≤ 3 that is at most 6 u (‖x‖₁ + ‖point‖₁). One more unit covers second-order terms and ‖n‖ = 1 + O(u). The
-  // function returns more than twice that sum, 16 u: about 2e-15 m within a metre of the origin.
+  // With u = 2⁻⁵³, the computed height of a point meant to be on the surface has an error of at most u ‖x‖
+  // (coordinates) + u ‖x − point‖ (difference) + (N + 1) u ‖x − point‖ (sum), for N ≤ 3 at most 6 u (‖x‖₁ + ‖point‖₁).
+  // One more unit covers second-order terms and ‖n‖ = 1 + O(u). The function returns more than twice that, 16 u: about
+  // 2e-15 m within a metre of the origin.
   [[nodiscard]] double rounding(const Vec<N>& x) const noexcept {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
     return 16.0 * u * (x.template lpNorm<1>() + point_size_);

@@ -47,10 +47,9 @@ struct CrossSection {
 
   // Whether g vanishes at s within rounding. A sign change may also be a pole of g; beside a pole g is large.
   //
-  // Friction of contact i reverses while s passes s_i, over a distance of about w_i. So g's slope is up to μ_i
-  // f_i/|w_i| there (5e3 for a q 0.3 nm beside the line, pressed 6 µm deep), and g vanishes no better than to this
-  // slope times the rounding of s. Shares are capped at the force without friction, so that a pole doesn't pass for a
-  // root.
+  // Friction of contact i reverses within about w_i of s_i. So g's slope is up to μ_i f_i/|w_i| there (5e3 for a q 0.3
+  // nm beside the line, pressed 6 µm deep), and g vanishes only to this slope times the rounding of s. Shares are
+  // capped at the force without friction, so that a pole doesn't pass for a root.
   [[nodiscard]] bool is_root(double s, const Shares& shares) const noexcept {
     constexpr double eps = std::numeric_limits<double>::epsilon();
     const double force = std::abs(F_n) + std::abs(F_t), s_size = std::abs(s) + std::abs(s_p) + std::abs(s_q[0]);
@@ -196,8 +195,8 @@ class Groove {
 
   // If p is far deeper than q was away, friction across the line can make the 2 × 2 system singular: g then has several
   // roots, or poles between them. Searches from s_p towards s_1, in intervals that end 0.7 times as far from s_1 as
-  // they begin. If the first root was refused because a contact pulls, the search begins 1000 w from s_1: farther away
-  // all slips are practically along e, and g has no further root.
+  // they begin. After a first root at which a contact pulls, the search begins 1000 w from s_1: farther away all slips
+  // are practically along e, and g has no further root.
   void look_for_another_root(const CrossSection& c, bool first_was_root) noexcept {
     const double widest = std::max(std::abs(c.w[0]), std::abs(c.w[1])), way = std::abs(s_p_ - s_q_[0]);
     double at = first_was_root ? std::min(1.0, 1e3 * widest / way) : 1.0;

@@ -2,18 +2,17 @@
 //
 // In units where K = 1, a line with direction e bears any force across e, and along e it bears friction:
 //   r = q if |eᵀ(p − q)| ≤ μ ‖f_⟂‖,  else eᵀ(r − p) = ∓ μ ‖f_⟂‖,   f = r − p.
-// This is (4) with the distance from the line in place of the penetration. A q beside the guide first moves to the
-// nearest point of the guide.
+// This is (4) with the distance from the line as penetration. A q beside the guide first moves to the nearest point of
+// the guide.
 //
 // An object that has moved over q first pushes the proxy along a line or a polyline to q': the next point of the guide
-// outside the object, in the direction d = ±e with nᵀd > 0, where n is the object's normal there. Then q' replaces q,
-// and (4) and the stops work as with resting objects. So the object exerts a force F ≥ 0 along d, and F > 0 only in
-// contact: r = q' if dᵀ(p − q') ≤ μ ‖f_⟂‖. q' depends neither on p nor on K, so Assumption 1 holds. If there is no q'
-// within ten times the object's motion at q, the proxy is squeezed(): the object moves nearly across the guide, the
-// guide ends, or another object is in the way.
+// outside the object, in the direction d = ±e with nᵀd > 0, n being the object's normal. Then q' replaces q, and (4)
+// and the stops work as with resting objects. So the object exerts a force F ≥ 0 along d, and F > 0 only in contact: r
+// = q' if dᵀ(p − q') ≤ μ ‖f_⟂‖. q' depends neither on p nor on K, so Assumption 1 holds. Without a q' within ten times
+// the object's motion at q, the proxy is squeezed(): the object moves nearly across the guide, the guide ends, or
+// another object is in the way.
 //
-// A plane guide among objects is two half-spaces back to back (scenes/compiler/compile.cpp), which World solves with
-// them.
+// Among objects, a plane guide is two half-spaces back to back (scenes/compiler/compile.cpp) in a World.
 #pragma once
 
 #include <array>

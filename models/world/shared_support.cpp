@@ -18,7 +18,6 @@ constexpr int most_rounds = 4;
 constexpr double farthest_m = 1e4;
 static_assert(3 * most <= most_equations);
 
-// One contact on its tangent plane.
 struct FlatContact {
   FlatSurface<3> surface = FlatSurface<3>::of_unit(Vec3::Zero(), Vec3::UnitZ());
   double mu = 0.0;
@@ -275,7 +274,6 @@ Confirmed confirm(SharedSupport& support, const FlatSupport& flat, double K, con
 }  // namespace
 
 bool SharedSupport::solve(double K, const Vec3& p, const Vec3& q) noexcept {
-  // Beyond this, rounding is as large as layers are thin.
   if (!((p - q).norm() <= farthest_m)) return false;
   FlatSupport flat;
   flat.count = count;

@@ -4,15 +4,14 @@
 // depth, and any number of layers may press at once. So the force f = K (r − p) is shared:
 //   f = Σ f_i,   r = 𝒢_i(K, r − f_i/K, q)   for each i,
 // where 𝒢_i is the step of obstacle i alone (Obstacle::step). Each contact is thus the paper's single contact, with the
-// forces of the others added to p. By Assumption 1 of each 𝒢_i, equations in r and f_i that hold for one K hold for
-// all.
+// other forces added to p. By Assumption 1, a solution r, f_i for one K solves the equations for all K.
 //
 // On tangent planes 𝒢_i is (4) with a layer: piecewise smooth, with kinks where a contact starts to touch, to slip or
-// to be pressed through to its core. A semismooth Newton method (L. Qi and J. Sun, "A nonsmooth version of Newton's
-// method", Mathematical Programming 58, 1993) solves the equations. It starts from one nonlinear Gauss–Seidel sweep, in
-// which each contact takes the latest forces of the others. If Newton's steps don't reduce the residual, more sweeps
-// follow, then other stiffnesses in place of K. For curved surfaces this repeats on the tangent planes at each solution
-// until it settles (settling.hpp). A solution is accepted only if every 𝒢_i itself confirms it.
+// to reach its core. A semismooth Newton method (L. Qi and J. Sun, "A nonsmooth version of Newton's method",
+// Mathematical Programming 58, 1993) solves the equations, from one nonlinear Gauss–Seidel sweep. If Newton's steps
+// don't reduce the residual, more sweeps follow, then other stiffnesses in place of K. For curved surfaces this repeats
+// on the tangent planes at each solution until it settles (settling.hpp). A solution counts only if every 𝒢_i itself
+// confirms it.
 #pragma once
 
 #include <array>

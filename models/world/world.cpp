@@ -192,10 +192,10 @@ void World::set_time(const StepTime& time) noexcept {
   for (const std::size_t i : moving_) entries_[i].obstacle->set_time(time.time_s, time.period_s);
 }
 
-// Gathers into near_ all obstacles that the step can meet. Returns the radius of the ball around (p + q)/2 that was
-// searched, at least `reach`. In convex free space (r − p)ᵀ(r − q) ≤ 0, so r lies in the ball with the diameter qp
-// (Thales). Around a convex solid of radius R it may lie outside by ‖r − q‖²/2R; twice the radius covers this. Layers
-// that spring back and moving objects can take r farther: operator() then gathers again.
+// Gathers into near_ all obstacles that the step can meet. Returns the radius of the searched ball around (p + q)/2, at
+// least `reach`. In convex free space (r − p)ᵀ(r − q) ≤ 0, so r lies in the ball with the diameter qp (Thales). Around
+// a convex solid of radius R it may lie outside by ‖r − q‖²/2R; twice the radius covers this. If springy layers or
+// moving objects take r farther, operator() gathers again.
 double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
   const Vec3 middle = 0.5 * (p + q);
   const double radius = std::max(reach, (p - q).norm() * (1.0 + 1e-9) + 1e-12 * (1.0 + p.lpNorm<1>()));
@@ -246,11 +246,11 @@ bool World::add_those_at(double K, const Vec3& p, const Vec3& q, const Vec3& r) 
   return pressed_.size() > before;
 }
 
-// Reduces pressed_ to the planes that would hold the proxy without friction, and the next nearest ones: each obstacle
-// counts as the plane that would hold the proxy alone, and p is projected onto their polyhedron. A dual method: take
-// the planes that hold the point and the plane that the point is deepest behind, move to the nearest point to p on
-// their free side, and repeat until the point is on the free side of all. The distance to p grows each time, so no set
-// comes twice. Depths up to a billionth of that distance are ignored.
+// Reduces pressed_ to the obstacles that would hold the proxy without friction, and the next nearest ones. Each
+// obstacle counts as its plane at the step alone, and p is projected onto the planes' polyhedron by a dual method: to
+// the planes that hold the point, add the plane that it is deepest behind, and move to the nearest point to p on their
+// free side, until the point is on the free side of all. The distance to p grows each time, so no set comes twice.
+// Depths up to a billionth of that distance are ignored.
 void World::choose(double K, const Vec3& p, const Vec3& q) noexcept {
   constexpr int most_exchanges = 64;
   constexpr double passed = 1e-9;
@@ -319,9 +319,9 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
   return all;
 }
 
-// Whether all these obstacles are at r. Pairs and triples are solved on tangent planes, and a face's plane continues
-// beyond the face's edges, where nothing holds a proxy. The tolerance lies between two scales: rounding is smaller for
-// objects of up to a hundred metres, and a proxy held 1e-12 m off a face's edge counts as held at the edge.
+// Whether all these obstacles are at r: pairs and triples are solved on planes, but beyond a face's edges its plane
+// holds nothing. The tolerance lies between two scales: rounding is smaller for objects of up to a hundred metres, and
+// a proxy held 1e-12 m off a face's edge counts as held at the edge.
 bool World::all_touch(const Vec3& r, std::span<const std::size_t> contacts) const noexcept {
   const double nothing = 1e-12 * (1.0 + r.lpNorm<1>());
   return std::all_of(contacts.begin(), contacts.end(),
@@ -345,7 +345,6 @@ StepResult World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates
   return choice.result(candidates.grew);
 }
 
-// The contact that a candidate's obstacle reports if it presses together with others.
 Contact<3> World::contact_of(const Candidates& candidates, std::size_t candidate, bool slips,
                              const Vec3& normal) const noexcept {
   const Entry& entry = entries_[candidates.index[candidate]];

@@ -2,18 +2,16 @@
 //
 // Each obstacle near the step is asked for its step alone. If all others allow that point, it is the solution.
 // Otherwise pairs and triples of contacts are solved as in a PlaneComposition (contact_search.hpp), on the tangent
-// planes at the solution itself. For a curved surface the plane is taken anew at each point until the point settles
-// (settling.hpp); each time the error shrinks by penetration over radius. Among complete sets, fewer contacts come
-// first, then the smallest ‖r − p‖.
+// planes at the solution itself. For curved surfaces the planes are taken anew at each point until it settles
+// (settling.hpp). Among complete sets, fewer contacts come first, then the smallest ‖r − p‖.
 //
-// If five or more objects press in one place, their pairs and triples would be too many. World::choose then picks those
-// that would hold the proxy without friction. They are tried first, then the other sets, up to most_attempts in a step.
-// So a step among a thousand objects costs little more than one among ten; a step without a solution by then counts as
-// unresolved.
+// If five or more objects press in one place, World::choose picks those that would hold the proxy without friction.
+// They are tried first, then other sets, up to most_attempts in a step. So a step among a thousand objects costs little
+// more than one among ten; a step still without a solution counts as unresolved.
 //
 // If an elastic layer presses together with other obstacles, all that press share the force (shared_support.hpp).
 //
-// Each step first looks at the last known clearance: if both q and p are within it, the step touches nothing.
+// A step with q and p within the last known clearance touches nothing and skips all this.
 #pragma once
 
 #include <array>
