@@ -105,7 +105,7 @@ class Arm {
   //   q_motor = q + τ_g(q)/k   (motor angles as angles at the joint; k = 0 is a rigid gear)
   [[nodiscard]] JointVector motor_from_link(const JointVector& q) const noexcept;
   [[nodiscard]] JointVector motor_from_link(const JointVector& q, const Wrench& wrench_W) const noexcept;
-  // The same while the links start to move with this acceleration: q + (M_link q̈ + τ_g)/k, without speeds. One pass
+  // The same while the links start to move with this acceleration: q + (M_link q̈ + τ_g)/k, neglecting speeds. One pass
   // outwards and one back, without the matrix. The outward pass also gives the kinematics at q.
   [[nodiscard]] JointVector motor_from_moving_link(const JointVector& q, const JointVector& acceleration_rad_per_s2,
                                                    ToolKinematics& at_q) const noexcept;

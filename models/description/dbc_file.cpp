@@ -360,7 +360,7 @@ class Reader {
       for (DbcSignal& signal : message.signals) {
         if (signal.name != name || type == 0) continue;
         if (type == 1 && signal.length != 32) throw error("a float of 32 bits");
-        // Doubles and shifted floats are accepted here, but can't be used.
+        // Doubles are accepted here, but their 64 bits can't be used.
         if (type == 1) signal.number.kind = NumberKind::real;
         if (type == 2) signal.length = 64;
       }

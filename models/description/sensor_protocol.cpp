@@ -28,7 +28,7 @@ struct Reader {
   std::map<std::string, Setting> settings{};
   bool big_endian = true;
   std::optional<DbcFile> dbc{};
-  std::vector<const DbcMessage*> messages{};  // by frame; null if the frame states its own identifier
+  std::vector<const DbcMessage*> messages{};  // for each frame; null if the frame states its own identifier
 
   void read_settings() {
     if (const auto node = root.find_map("settings")) {

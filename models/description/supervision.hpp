@@ -30,7 +30,7 @@ namespace proxarm::description {
 
 class YamlNode;
 
-// A fault that leaves a choice, by the controller's name for it, and the allowed reactions.
+// A fault, by its name in the controller, and the reactions that a cell may choose for it.
 struct ReactionChoice {
   const char* fault;
   std::vector<std::string> allowed;
@@ -51,18 +51,19 @@ struct SupervisionDescription {
   double release_speed_m_per_s = 0.05;
   LetGo let_go = LetGo::rest;
   double empty_handle_N = 0.1;     // below this for half a second nobody holds the handle
-  double max_bias_drift_N = 0.5;   // largest drift of the sensor's bias meanwhile
-  double max_force_step_N = 60.0;  // between two samples, by hand and handle (controller/handle/force_jump.hpp)
+  double max_bias_drift_N = 0.5;   // largest drift of the sensor's bias while nobody holds the handle
+  double max_force_step_N = 60.0;  // largest change of force by hand and handle between two samples
+                                   // (controller/handle/force_jump.hpp)
   bool monitored_standstill = false;
-  double bus_loss_stop_s = 0.06;  // within which each drive on CAN stops by itself when the controller is gone
+  double bus_loss_stop_s = 0.06;  // time in which each drive on CAN stops by itself when the controller is gone
   std::string brake_release;      // how to open the brakes by hand; empty: not possible
   std::map<std::string, std::string> reactions;  // fault's name to one of its reaction_choices()
 
   bool operator==(const SupervisionDescription&) const = default;
 };
 
-// The second contact of an enabling switch with three positions, in the same object or message: the switch is squeezed
-// through.
+// The contact that closes when an enabling switch with three positions is squeezed through; in the same object or
+// message.
 struct PanicContact {
   int byte = 0;             // of the message's data
   int bit = 0;              // of that byte; for a drive's object 0 to 31
@@ -71,7 +72,8 @@ struct PanicContact {
   bool operator==(const PanicContact&) const = default;
 };
 
-// The bit of the person's enabling switch: pressed; with three positions, in the middle one.
+// The bit that is set while the person presses the enabling switch; with three positions, while it is in the middle
+// one.
 struct EnablingInputDescription {
   std::string drive;                // joint of the drive whose digital input it is; empty: a CAN message
   std::uint32_t object = 0x60FD00;  // of that drive, index << 8 | sub-index, 32 bits, in TPDO2 at every SYNC

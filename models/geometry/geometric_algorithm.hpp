@@ -36,7 +36,7 @@ struct Contact {
 
 // What a 𝒢 may use besides K, p and q. Only moving objects and laws that contain time need it.
 struct StepTime {
-  double time_s = 0.0;     // time of the q to be found
+  double time_s = 0.0;     // time of q(k), at the end of the step
   double period_s = 1e-3;  // T; 2T/3 at order 2
 };
 

@@ -141,7 +141,7 @@ class Sets {
   double within_;
   std::vector<std::uint32_t> parent_;
   std::vector<Bounds> boxes_;
-  std::vector<std::vector<std::uint32_t>> triangles_;  // by root
+  std::vector<std::vector<std::uint32_t>> triangles_;  // of each root's set
 };
 
 }  // namespace
@@ -183,7 +183,7 @@ class Fronts {
   }
 
   void choose() {
-    // Starts from faces with a fixed front; then come the parts without any.
+    // First starts from faces with a fixed front, then treats the parts without any.
     for (std::uint32_t f = 0; f < done_.size(); ++f) {
       if (!free_[f] && !done_[f]) (void)spread(f);
     }
@@ -208,7 +208,7 @@ class Fronts {
     return (t[0] == a && t[1] == b) || (t[1] == a && t[2] == b) || (t[2] == a && t[0] == b);
   }
 
-  // Spreads over edges of two faces, to faces whose front may be chosen.
+  // Walks from a face over edges with two faces, and turns the faces whose front may be chosen.
   std::vector<std::uint32_t> spread(std::uint32_t from) {
     std::vector<std::uint32_t> part{from};
     done_[from] = true;
@@ -255,9 +255,9 @@ struct SameCorners {
   std::optional<std::uint32_t> opposite;
 };
 
-// By set of corners: whether its faces with both fronts belong to a surface of their own, a connected one of which no
-// edge has a face with only one front. A wall between two bodies that touch isn't one: each body needs its side of the
-// wall.
+// For each set of corners: whether its faces with both fronts belong to a separate surface, a connected one without an
+// edge that a face with only one front shares. A wall between two bodies that touch isn't one: each body needs its side
+// of the wall.
 std::vector<bool> surfaces_on_their_own(const TriangleSoup& soup, const std::vector<SameCorners>& all) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> edges;
   for (std::uint32_t s = 0; s < all.size(); ++s) {

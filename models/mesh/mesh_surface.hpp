@@ -113,7 +113,7 @@ class MeshSurface final : public GeometricAlgorithm<3> {
     std::uint32_t face = 0;
     int side = 0;  // 1: front, −1: back, 0: no face
     FlatSurface<3> surface = FlatSurface<3>::of_unit(Vec3::Zero(), Vec3::UnitZ());
-    std::array<Vec3, 3> out;    // by side of the triangle: the outward normal in the face's plane, unit
+    std::array<Vec3, 3> out;    // for each side of the triangle: the outward normal in the face's plane, unit
     std::array<double, 3> rim;  // outᵀ corner
   };
   Held held_;

@@ -40,7 +40,8 @@ struct BoxObstacle::Crossing {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();
   int face = -1;                   // the face through which the way enters; -1: q is inside
-  std::array<double, 6> enters{};  // by face, if q is outside of it or on it; otherwise negative
+  std::array<double, 6> enters{};  // for each face: the fraction of the way that reaches its plane; negative unless q
+                                   // is on it or outside
 
   [[nodiscard]] bool any() const noexcept { return enter < leave && enter < 1.0 && leave > 0.0; }
 };

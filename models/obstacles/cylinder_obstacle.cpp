@@ -27,7 +27,8 @@ struct CylinderObstacle::Crossing {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();
   std::int32_t feature = -1;              // -1: q is inside
-  double enters[3] = {-1.0, -1.0, -1.0};  // by feature, if q is outside of it or on it; otherwise negative
+  double enters[3] = {-1.0, -1.0, -1.0};  // for each feature: the fraction of the way that reaches it; negative unless
+                                          // q is on it or outside
 
   [[nodiscard]] bool any() const noexcept { return enter < leave && enter < 1.0 && leave > 0.0; }
   void enter_at(double t, std::int32_t by) noexcept {
@@ -122,7 +123,7 @@ Obstacle::Step CylinderObstacle::beside_face(std::int32_t feature, const Step& s
   // Finds the place on the rim, as an angle from q's direction towards p's. On the rim's tangent there, the proxy is
   // drawn towards p at the first angle and back towards q at the last.
   const Vec3 end = std::copysign(1.0, z) * e_, u_q = radial(q), first = (u_q.norm() > 0.0 ? u_q : u).normalized();
-  // The tangent's sign comes from p, not its direction: the part of p's direction across `first` may be almost zero.
+  // p only chooses the tangent's sign: the part of p's direction across `first` may be almost zero.
   const Vec3 u_p = radial(p), tangent = e_.cross(first);
   const Vec3 onward = tangent.dot(u_p) < 0.0 ? Vec3(-tangent) : tangent;
   const StepOnPlanes step{side_.friction(), K, end_[0].layer(), p, q};

@@ -19,7 +19,7 @@ namespace proxarm::models {
 
 class MovingObstacle final : public Obstacle {
  public:
-  // `still`: the object at rest, in its described place.
+  // `still`: the object at the place where the scene describes it.
   MovingObstacle(std::unique_ptr<Obstacle> still, const ScriptedMotion& motion)
       : still_(std::move(still)), motion_(motion), scripted_(true) {
     last_ = now_ = motion_.at(0.0);

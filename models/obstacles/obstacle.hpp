@@ -93,8 +93,8 @@ class Obstacle {
   // there, towards x.
   virtual bool parts(const Vec3& /*x*/, const Vec3& /*y*/, Vec3& /*normal*/) const noexcept { return false; }
 
-  // Sets the size (m) of coordinates in W. Points are rounded by it on their way to the frame of a MovingObstacle,
-  // which calls this for its object.
+  // For the object of a MovingObstacle: sets the size (m) of coordinates in W, which bounds the rounding of points on
+  // their way to the object's frame.
   virtual void set_rounding_size(double /*size_m*/) noexcept {}
 
   // Takes effect with the next step. Precondition: finite and not negative.

@@ -56,8 +56,8 @@ class PlaneComposition final : public GeometricAlgorithm<3> {
   bool search(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
 
   std::vector<Face> faces_;
-  std::vector<GrooveLine> lines_;  // of all pairs, at i · n + j; empty if there are many faces: computed when needed
-  std::vector<CornerPoint> corners_;  // of all triples, at (i · n + j) · n + k; empty if there are many faces
+  std::vector<GrooveLine> lines_;     // of all pairs, at i · n + j; empty if there are too many faces to store them
+  std::vector<CornerPoint> corners_;  // of all triples, at (i · n + j) · n + k; empty if there are too many faces
   std::array<Contact<3>, 3> contacts_{};
   std::size_t count_ = 0;
   std::uint64_t without_friction_ = 0;

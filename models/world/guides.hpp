@@ -110,7 +110,7 @@ class PolylineGuide final : public GeometricAlgorithm<3> {
   std::size_t last_ = 0;            // the piece on which the last step ended
   std::shared_ptr<World> objects_;  // resting objects; null: none
   std::shared_ptr<std::vector<World::Entry>> movers_;
-  std::vector<char> pushes_;  // by moving object: 1 if it pushes in this step
+  std::vector<char> pushes_;  // for each moving object: 1 if it pushes in this step
   std::uint64_t unresolved_ = 0;
   bool squeezed_ = false;
   std::array<Contact<3>, 2> contacts_;

@@ -29,7 +29,7 @@ class Media final : public GeometricAlgorithm<N> {
  public:
   static constexpr double first_period_s = 1e-3;  // T until the first set_time()
 
-  // `X_WS`: pose of the proxy's space in W; the proxy has its first N coordinates. Shapes are in W.
+  // The proxy's coordinates are the first N of a frame S; `X_WS` is the pose of S in W. Shapes are in W.
   Media(std::unique_ptr<GeometricAlgorithm<N>> rest, std::vector<Medium> media, double period_s = first_period_s,
         const Pose& X_WS = Pose::Identity())
       : rest_(std::move(rest)), media_(std::move(media)), X_WS_(X_WS), T_(period_s) {}

@@ -16,9 +16,9 @@ namespace proxarm::models {
 inline constexpr int most_settling = 60;
 
 // Whether r has settled as far as rounding allows. A move of less than 1e-9 of the coordinates no longer tilts tangent
-// planes, because surfaces leave them by its square. It is the last move if the next one, shorter by `contraction`,
-// would be below rounding, or if moves no longer shrink. (A fixed threshold would fail: a slip that is short compared
-// with a deep p amplifies rounding.)
+// planes: a curved surface departs from its tangent plane only by the square of the move. It is the last move if the
+// next one, shorter by `contraction`, would be below rounding, or if moves no longer shrink. (A fixed threshold would
+// fail: a slip that is short compared with a deep p amplifies rounding.)
 inline bool has_settled(double move, bool shrinks, double contraction, const Vec3& r) noexcept {
   const double size = 1e-3 + r.lpNorm<1>(), nothing = 5e-17 * size;
   return move <= nothing || (move <= 1e-9 * size && (contraction * move <= nothing || !shrinks));

@@ -24,7 +24,8 @@ namespace proxarm::models {
 struct SharedSupport {
   static constexpr std::size_t most = 12;
   std::array<const Obstacle*, most> obstacle{};
-  std::array<Obstacle::Step, most> step{};  // in: of each obstacle alone; out: with its share (touches: presses)
+  std::array<Obstacle::Step, most> step{};  // in: each obstacle's step alone; out: with its share of force; touches: it
+                                            // presses
   std::size_t count = 0;
   Vec3 r = Vec3::Zero();
   // What solve() may still spend, in units of about 40 ns; solve() deducts its cost. The whole budget is 0.4 ms. A step

@@ -18,8 +18,8 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// For up to `crowd` pressing obstacles, all pairs and triples are tried, 10 in all. From more, `chosen` are picked: 20
-// pairs and triples, some microseconds each.
+// If up to `crowd` obstacles press, all their pairs and triples are tried, 10 in all. If more press, only `chosen` of
+// them count: 20 pairs and triples, some microseconds each.
 constexpr std::size_t crowd = 4, chosen = 5;
 constexpr int most_attempts = 64;
 
@@ -488,8 +488,8 @@ bool World::is_free(const Vec3& q, const Vec3& r) const noexcept {
   });
 }
 
-// The fallback if no set is complete: the proxy stays if it is allowed at q. Otherwise it goes to the end of the single
-// step that is nearest to p.
+// The fallback if no set is complete: the proxy stays if it is allowed at q. Otherwise it takes the step of the one
+// obstacle whose step ends nearest to p.
 void World::stay(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept {
   const bool allowed = is_free(q, q);
   for (std::size_t c = 0; c < candidates.count; ++c) {

@@ -116,7 +116,7 @@ class World final : public GeometricAlgorithm<3> {
   std::vector<std::size_t> unbounded_;  // obstacles without finite bounds
   std::vector<std::size_t> moving_;     // moving ones, bounded or not
   BoundsTree tree_;                     // all others
-  std::vector<bool> elastic_;           // by obstacle: whether it has an elastic layer
+  std::vector<bool> elastic_;           // for each obstacle: whether it has an elastic layer
   bool soft_ = false;                   // whether any has
   // The obstacles that a step may meet. First the resting ones within near_radius_ of near_centre_, gathered anew only
   // when a step leaves that ball; then the moving ones that are close in this step.
