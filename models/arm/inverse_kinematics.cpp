@@ -32,7 +32,7 @@ Vec3 rotation_vector(const Mat3& R) noexcept {
   return (2.0 * std::atan2(s, r.w()) / s) * r.vec();
 }
 
-// The smallest singular value and its left vector, by the power method on J⁻¹, from its largest row. Converges with the
+// The smallest singular value and its left vector, by the power method on J⁻¹ from its largest row. Converges with the
 // squared ratio of the two smallest singular values, so it is accurate near singularities.
 void smallest_singular_value(const Mat6& inverse, double& sigma, Vec6& direction) noexcept {
   Eigen::Index row = 0;

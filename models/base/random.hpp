@@ -1,5 +1,5 @@
 // Random numbers that are equal on every machine and with every compiler. From <random> it uses only the engine, whose
-// output the standard defines. Published figures, tests and the points that `check` tests depend on the sequence.
+// output the standard defines. Published figures, tests and `check` depend on the sequence.
 //
 // One caller at a time. No allocation.
 #pragma once

@@ -1,7 +1,7 @@
 // A cell as its file describes it: the arm, its tool, the buses, a drive per joint, the sensor, the limits.
 //
-// Plain data without behaviour, in SI units unless a name says otherwise. load_cell() reads it; the controller, the
-// field bus and the simulated arm use it.
+// Plain data, in SI units unless a name says otherwise. load_cell() reads it; the controller, the field bus and the
+// simulated arm use it.
 #pragma once
 
 #include <array>
@@ -115,8 +115,8 @@ struct DriveFeedback {
 // Longest delay of `gear_torque` readings: later ones don't damp the frequencies at which arms swing.
 inline constexpr double longest_gear_torque_delay_s = 0.005;
 
-// How a drive measures the torque of its joint's gear: with a torque sensor on the link's side, or with a second
-// encoder there, whose angle gives the gear's windup. The object is the last one in TPDO1.
+// How a drive measures the torque of its joint's gear: by a torque sensor on the link's side, or by a second encoder
+// there, whose angle gives the gear's windup. The object is the last one in TPDO1.
 struct GearTorque {
   std::uint32_t object = 0;            // index << 8 | sub-index
   std::uint8_t bits = 16;              // 16, 32; signed

@@ -1,7 +1,7 @@
 // How a drive with an incremental encoder remembers that it was homed since power-on.
 //
 // CiA 402 has no such flag outside of homing mode. A value in 1020h (verify configuration) is lost with the power
-// unless it is stored (1010h). So homing ends by writing a number there that identifies this joint and this zero.
+// unless it is stored (1010h). So homing ends by writing a number there for this joint and this zero.
 #pragma once
 
 #include <cmath>

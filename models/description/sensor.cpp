@@ -13,9 +13,8 @@ namespace {
 
 using Matrix = std::array<std::array<double, 6>, 6>;
 
-// The condition number of a 6×6 matrix, to judge whether its inverse keeps digits of single precision: Gauss-Jordan
-// inversion with partial pivoting, then the condition number of the row-scaled matrix in the ∞-norm (rows differ only
-// by their units).
+// The condition number of a 6×6 matrix, to judge whether its inverse keeps digits of single precision: by Gauss-Jordan
+// inversion with partial pivoting, in the ∞-norm of the row-scaled matrix (rows differ only by their units).
 double condition(Matrix a) {
   Matrix inverse{};
   double norm = 0.0, inverse_norm = 0.0;

@@ -1,8 +1,8 @@
 // A force sensor's description: its protocol, its range, and data for the simulated sensor.
 //
-// A file under models/sensors. A real ATI Net CAN OEM sends its matrix and counts over CAN at start. Its file holds the
-// simulation's values, so that the simulated sensor can answer those requests. For any other CAN sensor the file holds
-// everything (sensor_protocol.hpp).
+// A file under models/sensors. A real ATI Net CAN OEM sends its matrix and counts at start; its file holds values with
+// which the simulated sensor answers those requests. For any other CAN sensor the file holds everything
+// (sensor_protocol.hpp).
 #pragma once
 
 #include <array>

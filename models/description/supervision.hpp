@@ -62,7 +62,7 @@ struct SupervisionDescription {
   bool operator==(const SupervisionDescription&) const = default;
 };
 
-// The contact that closes when an enabling switch with three positions is squeezed through; in the same object or
+// The contact that shows that an enabling switch with three positions is squeezed through; in the same object or
 // message.
 struct PanicContact {
   int byte = 0;             // of the message's data
@@ -72,8 +72,7 @@ struct PanicContact {
   bool operator==(const PanicContact&) const = default;
 };
 
-// The bit that is set while the person presses the enabling switch; with three positions, while it is in the middle
-// one.
+// The bit that shows that the person presses the enabling switch; with three positions, that it is in the middle one.
 struct EnablingInputDescription {
   std::string drive;                // joint of the drive whose digital input it is; empty: a CAN message
   std::uint32_t object = 0x60FD00;  // of that drive, index << 8 | sub-index, 32 bits, in TPDO2 at every SYNC

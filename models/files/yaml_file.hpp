@@ -103,8 +103,8 @@ class YamlNode {
   [[nodiscard]] std::filesystem::path existing_file(std::string_view key) const;
 
   // From now on, `defaults`, a map of the same file, supplies keys that this map lacks; in maps that both have, key by
-  // key. Errors name the value's own place. Keys asked of this map also count as known in `defaults`. Does nothing if
-  // this isn't a map.
+  // key. Errors name the value's own place. Keys asked of this map count as known in `defaults`, too. Does nothing
+  // unless this is a map.
   void default_to(const YamlNode& defaults) const;
   // The same for the map under that key, which is created empty if missing.
   void default_to(std::string_view key, const YamlNode& defaults) const;

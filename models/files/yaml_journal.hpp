@@ -1,6 +1,6 @@
-// Records what readers ask of a YAML file: each key with its kind, unit, range and default. The reading calls
-// (yaml_file.hpp, yaml_rules.hpp) are the only place of these facts. `proxarm schema` makes schemas and reference
-// tables from what a journal records while example files are read.
+// Records what readers ask of a YAML file: each key with its kind, unit, range and default. These facts exist only in
+// the reading calls (yaml_file.hpp, yaml_rules.hpp). `proxarm schema` makes schemas and reference tables from what a
+// journal records while example files are read.
 #pragma once
 
 #include <cstddef>

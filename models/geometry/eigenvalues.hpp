@@ -1,5 +1,5 @@
-// Eigenvalues of matrices, small and large. Eigen compiles its iterative solvers anew, for seconds, in every source
-// that uses one; these functions keep them in one source each.
+// Eigenvalues of matrices, small and large. Eigen would compile its iterative solvers anew, for seconds, in every
+// source that uses one.
 #pragma once
 
 #include "models/geometry/geometry.hpp"
@@ -9,7 +9,6 @@ namespace proxarm::models {
 
 // The largest |λ| of a square matrix. This and the next two functions take matrices of any size and allocate.
 double spectral_radius(const Eigen::MatrixXd& A);
-// All λ of a square matrix.
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& A);
 // λ of K v = λ M v, ascending. Precondition: K is symmetric, M symmetric and positive definite, of the same size.
 Eigen::VectorXd generalized_eigenvalues(const Eigen::MatrixXd& K, const Eigen::MatrixXd& M);

@@ -29,8 +29,8 @@ struct Contact {
   std::int32_t feature = 0;        // face, edge or region within the object
   bool slips = false;              // false: the proxy sticks there, or there is no friction
   Vec<N> normal = Vec<N>::Zero();  // unit, out of the object
-  // Only for a sticking contact: the proxy slid over other faces within this step before it came to rest here. Then v
-  // in (17) is 0, not N Nᵀ (r − q)/T, and the point may depend on K.
+  // Only for a sticking contact: within this step the proxy slid over other faces to this point. Then v in (17) is 0,
+  // not N Nᵀ (r − q)/T, and the point may depend on K.
   bool reached = false;
 };
 
@@ -63,15 +63,15 @@ class GeometricAlgorithm {
   // The contacts that press after the last step; empty in free motion. Valid until the next call.
   [[nodiscard]] virtual std::span<const Contact<N>> contacts() const noexcept { return {}; }
 
-  // The number of steps so far in which the world found no answer that keeps all its laws and gave one law up: moving
-  // objects squeeze the proxy, or two faces jam it. Deserves a warning, and a fault if it lasts.
+  // Steps so far in which no answer kept all of the world's laws and one law was given up: moving objects squeeze the
+  // proxy, or two faces jam it. Deserves a warning, and a fault if it lasts.
   [[nodiscard]] virtual std::uint64_t unresolved_steps() const noexcept { return 0; }
 
   // Whether moving objects left the proxy inside an object in the last step, for lack of room. A fault.
   [[nodiscard]] virtual bool squeezed() const noexcept { return false; }
 
-  // A number that identifies the set of media at q (media act without a surface); 0: no medium. A proxy of order 2 cuts
-  // its step where the number changes.
+  // A number for the set of media at q (media act without a surface); 0: none. A proxy of order 2 cuts its step where
+  // it changes.
   [[nodiscard]] virtual std::uint32_t media_at(const Vec<N>& /*q*/) const noexcept { return 0; }
 
   // False if media_at() is always 0; a proxy then skips the call.

@@ -1,6 +1,5 @@
-// Products, inverses and linear systems of matrices of any size. They allocate, so they are for work before a session.
-// Eigen compiles its blocked forms for large matrices anew, for seconds, in every source that uses one; these functions
-// keep them in one source. Results equal Eigen's to the bit.
+// Products, inverses and linear systems of matrices of any size, for work before a session: they allocate. Eigen would
+// compile its blocked forms anew, for seconds, in every source that uses one. Results equal Eigen's to the bit.
 #pragma once
 
 #include "models/geometry/geometry.hpp"

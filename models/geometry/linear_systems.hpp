@@ -1,5 +1,5 @@
-// Linear systems A x = b of the sizes that the cycle solves. Nothing here allocates. Eigen compiles its decompositions
-// anew, for seconds, in every source that uses one; these functions keep them in few sources.
+// Linear systems A x = b of the sizes that the cycle solves. Nothing here allocates. Eigen would compile its
+// decompositions anew, for seconds, in every source that uses one.
 #pragma once
 
 #include <Eigen/LU>

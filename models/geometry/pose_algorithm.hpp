@@ -60,16 +60,16 @@ class PoseAlgorithm {
   // Sets an object's friction from the next step on; `object` is its index in the scene. Precondition: finite and not
   // negative.
   virtual void set_friction(std::int32_t /*object*/, double /*friction*/) noexcept {}
-  // Moves a driven object within the next step to X, relative to the place where the scene describes it; `object` is
-  // its index in the scene. Call it once before each step in which the object moves.
+  // Moves a driven object to X within the next step, relative to its described place; `object` is its index in the
+  // scene. Call it once before each step in which the object moves.
   virtual void drive(std::int32_t /*object*/, const Pose& /*X*/) noexcept {}
 
   // The tool's contacts after the last step; empty in free motion. Valid until the next call.
   [[nodiscard]] virtual std::span<const PoseContact> contacts() const noexcept { return {}; }
 
-  // Flags of the last step. Unresolved: no solution keeps all laws, and one law was given up. If the laws allow several
-  // solutions (a wedged peg, Painlevé's rod), one is chosen without a flag. Squeezed: moving objects left the tool no
-  // room, and it is inside one of them.
+  // Flags of the last step. Unresolved: no solution keeps all laws, and one law was given up. (If several solutions
+  // keep them, such as for a wedged peg or Painlevé's rod, one is chosen without a flag.) Squeezed: for lack of room,
+  // the tool is inside a moving object.
   [[nodiscard]] virtual bool unresolved() const noexcept { return false; }
   [[nodiscard]] virtual bool squeezed() const noexcept { return false; }
 

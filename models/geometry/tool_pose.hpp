@@ -48,8 +48,7 @@ inline Vec3 rotation_vector(const Quaternion& rotation) noexcept {
 }
 
 // The shortest rotation from UnitZ to a direction of any length but 0; for −UnitZ it turns about −UnitX. Equals Eigen's
-// Quaternion::FromTwoVectors(UnitZ, direction), which compiles a singular value decomposition: ten seconds in every
-// source that uses it.
+// Quaternion::FromTwoVectors(UnitZ, direction), which takes ten seconds to compile in every source that uses it.
 Quaternion rotation_from_z(const Vec3& direction) noexcept;
 
 // a ⊟ b.

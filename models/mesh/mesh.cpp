@@ -124,8 +124,8 @@ void TriangleMesh::weld(TriangleSoup& soup) {
   const auto& given = soup.vertices;
   std::vector<std::uint32_t> becomes(given.size()), place(given.size());
   std::vector<std::uint32_t> table(std::bit_ceil(2 * given.size() + 1), kUnused);
-  // Multiplicative hashing takes the upper bits of the product, which are the mixed ones. Coordinates from single
-  // precision have zeros in their lower 29 bits, so the lower bits would collide.
+  // Multiplicative hashing mixes the upper bits of the product. Coordinates from single precision have zeros in their
+  // lower 29 bits, so the lower bits would collide.
   const int below = 64 - std::countr_zero(table.size());
   for (std::uint32_t i = 0; i < given.size(); ++i) {
     std::uint64_t hash = 0;
@@ -261,8 +261,8 @@ void put_in_order(const std::vector<Item>& items, TriangleMesh::Structure& struc
 
 }  // namespace
 
-// Builds the tree by median splits: halves the triangles by the centres of their boxes, along the longest side of the
-// box around those centres, until they fit a leaf. Then puts triangles and vertices in that order.
+// Builds the tree by median splits: halves the triangles by their boxes' centres, along the longest side of the box
+// around the centres, until they fit a leaf. Then puts triangles and vertices in that order.
 void TriangleMesh::build() {
   const auto count = static_cast<std::uint32_t>(size());
   std::vector<Item> items = items_of(*this);

@@ -128,8 +128,8 @@ class FacePairs {
   }
 
   // The place where one face goes through the other: decided exactly, and only if deeper than rounding. The depth is
-  // the shortest move that separates the two, in the direction of a normal or across an edge of each. (Any direction
-  // can prove them apart, so the rounded direction across nearly parallel edges does no harm.)
+  // the shortest move that separates the two, along a normal or across an edge of each. (Rounding of the direction
+  // across nearly parallel edges does no harm: any direction can prove them apart.)
   [[nodiscard]] Place cut(std::uint32_t f, std::uint32_t g) const noexcept {
     Place at = cut_by_edge(f, g);
     if (!at) at = cut_by_edge(g, f);

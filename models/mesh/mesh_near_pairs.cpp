@@ -158,8 +158,8 @@ class CellSearch {
   }
 
   // Returns false to stop. Divides a cell if that leaves less than kLess of its pairs, or else at the expense of
-  // `credit`. So after n divisions there are at most kCredit kLessⁿ times the pairs of the whole. The recursion ends,
-  // and useless divisions cost at most kCredit times the pairs.
+  // `credit`. So n divisions leave at most kCredit kLessⁿ times the pairs of the whole: the recursion ends, and useless
+  // divisions cost at most kCredit times the pairs.
   bool search(const Part& part, double credit) const {  // NOLINT(misc-no-recursion): it ends, as above
     constexpr std::size_t few = 8;                      // pairs for each face: not worth dividing
     if (part.pairs <= few * part.size()) return look_at(part);
@@ -299,8 +299,8 @@ class CellSearch {
   }
 
   // The intervals along the axis on which they are thinnest. Candidates are the coordinate axes, the normals of some
-  // faces, and the axes in those faces across their longest edge: faces that lie on or beside one another, as in a
-  // stack or a fan, are apart along one of these.
+  // faces, and the axes in those faces across their longest edge: in a stack or a fan, faces are apart along one of
+  // these.
   [[nodiscard]] Shadows thinnest_shadows(const Cell& cell, const Faces& faces) const {
     const std::vector<Piece> pieces = pieces_of(cell, faces);
     Shadows thinnest = shadows_of(pieces, Vec3::UnitX());

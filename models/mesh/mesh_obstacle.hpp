@@ -1,8 +1,8 @@
 // A triangle mesh as an obstacle of a World. Each proxy needs a separate MeshObstacle, which remembers where the proxy
 // was; the TriangleMesh may be shared.
 //
-// If several faces of the mesh hold the proxy, the World sees the face that presses most. If a solution with other
-// objects would lead through a further face, that face joins them (World::fits).
+// If several faces hold the proxy, the World sees the one that presses most. If a solution with other objects would
+// lead through a further face, that face joins them (World::fits).
 #pragma once
 
 #include <limits>
@@ -53,8 +53,7 @@ class MeshObstacle final : public Obstacle {
   }
 
   // A proxy may end at r if a step from q to p = r ends there. It may also end within a few lifts of that step's end,
-  // because the tangent planes of two faces differ by that much where they meet; but never behind a face, which is
-  // tested exactly.
+  // because the tangent planes of adjacent faces differ by that much; but never behind a face, which is tested exactly.
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     const Vec3 reached = surface_(1.0, r, q);
     if (reached == r) return false;

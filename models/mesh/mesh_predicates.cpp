@@ -100,9 +100,9 @@ int exact_orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& x
   return sum.sign();
 }
 
-// The segment and the triangle lie in one plane. Both are convex, so they are apart if and only if the line of one of
-// the triangle's sides, or of the segment, separates them. The orientation with a third point beside the plane tells on
-// which side of a line a point is.
+// The segment and the triangle lie in one plane. Both are convex, so they are apart if and only if the line of a
+// triangle's side, or of the segment, separates them. The orientation with a third point beside the plane gives the
+// side of a line.
 bool touches_in_plane(const Vec3& x, const Vec3& y, const std::array<Vec3, 3>& t) noexcept {
   Eigen::Index axis = 0;
   (t[1] - t[0]).cross(t[2] - t[0]).cwiseAbs().maxCoeff(&axis);

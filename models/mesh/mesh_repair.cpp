@@ -52,8 +52,8 @@ class NearCorners {
     std::sort(cells_.begin(), cells_.end());
   }
 
-  // In each cell, a corner looks at kMost others with a larger index. That is enough to join all of them through each
-  // other, and keeps the time linear if thousands of corners lie within the tolerance.
+  // In each cell, a corner looks at kMost others with a larger index: enough to join all of them through each other,
+  // and linear in time if thousands of corners lie within the tolerance.
   [[nodiscard]] std::vector<NearPair> pairs() const {
     std::vector<NearPair> found;
     for (const auto& [cell, corner] : cells_) {

@@ -126,8 +126,8 @@ void MeshSurface::keep_side(const Contact<3>& contact) noexcept {
 }
 
 // The usual step, without a walk: the face that held the proxy alone still does. Returns true only if the walk would
-// find the same, bit for bit: this face blocks the way to p, the step on it stays within its sides, and no other face
-// is touched or crossed, each by more than rounding. Otherwise the walk decides.
+// find the same, bit for bit: by more than rounding, this face blocks the way to p, the step on it stays within its
+// sides, and no other face is touched or crossed.
 bool MeshSurface::glides(const Vec3& p, const Vec3& q, Vec3& r) noexcept {
   if (held_.side == 0 || !has_near(q)) return false;
   const TriangleMesh::Face& face = mesh_->face(held_.face);

@@ -107,9 +107,9 @@ struct Outlines {
   std::vector<std::vector<std::uint32_t>> chains;  // from the first vertex to the last
 };
 
-// Outlines of the edges that have one face. Each is walked against its face's direction, like the faces that would
-// close it. Chains come first, from vertices where more edges begin than end. After that, as many edges begin as end at
-// each vertex, and each walk returns to its start (Euler). A chain ends where outlines meet.
+// Outlines of the edges that have one face, walked against the face's direction, like the faces that would close them.
+// Chains come first, from vertices where more edges begin than end. After that, as many edges begin as end at each
+// vertex, and each walk returns to its start (Euler). A chain ends where outlines meet.
 Outlines outlines_of(std::vector<std::pair<std::uint32_t, std::uint32_t>> open, std::size_t vertices) {
   std::sort(open.begin(), open.end());
   std::vector<bool> used(open.size(), false);

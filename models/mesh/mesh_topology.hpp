@@ -1,7 +1,7 @@
 // How the faces of a mesh are connected: where the mesh is open, and what its defects are.
 //
 // A proxy needs no connections: nothing passes a face. But it falls through a hole that was overlooked. Vertices with
-// the same coordinates are one (TriangleMesh), so the gaps found here are gaps in space, not in a file's numbering.
+// the same coordinates are one (TriangleMesh), so gaps are gaps in space, not in a file's numbering.
 #pragma once
 
 #include <cstddef>

@@ -18,8 +18,8 @@ struct MeshSurface::Walk {
     Vec3 point, normal;  // of the touched surface, which is a lift away from the face
     [[nodiscard]] FlatSurface<3> surface() const noexcept { return FlatSurface<3>::of_unit(point, normal); }
   };
-  // Most faces that are considered together. A regular mesh has six around a vertex. From more than 64, the faces with
-  // the least indices count; at such a vertex the proxy may then stick where it could slide.
+  // Most faces that are considered together. A regular mesh has six around a vertex. Of more than 64, those with the
+  // least indices count; the proxy may then stick at the vertex where it could slide.
   static constexpr std::size_t kMost = 64;
   // For up to this many touched faces, all pairs and triples are tried. For more, only pairs that share a side: the
   // number of triples grows with the cube.

@@ -1,5 +1,5 @@
-// A bounding-volume tree of axis-aligned boxes over many objects: which objects are near a point, and how far is the
-// nearest? Queries allocate nothing and may come from any thread.
+// A bounding-volume tree of axis-aligned boxes: which objects are near a point, and how far is the nearest? Queries
+// allocate nothing and may come from any thread.
 #pragma once
 
 #include <algorithm>
@@ -73,8 +73,8 @@ class BoundsTree {
     std::size_t index = 0;
     bool leaf = false;
   };
-  // Each level halves the number of leaves, and a search keeps one node of each level on the stack. Ten thousand
-  // objects need 15 places; 2³² leaves, more than indices can name, would need 33.
+  // Each level halves the leaves, and a search keeps one node of each level. Ten thousand objects need 15 places; 2³²
+  // leaves, more than indices can name, would need 33.
   static constexpr int stack_depth_ = 80;
 
   static double distance2(const Bounds& b, const Vec3& x) noexcept {

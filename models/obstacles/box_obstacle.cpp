@@ -101,8 +101,8 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
     return true;
   };
   // The segment enters the box through the last plane that it crosses (slab method). So of the faces that hold the
-  // proxy, the one with the largest t counts. If several have the same t (q on an edge), the one on which the proxy
-  // ends nearest to p counts.
+  // proxy, the one with the largest t counts; if several have the same t (q on an edge), the one that holds it nearest
+  // to p.
   Step best;
   double best_t = -1.0, best_distance = 0.0;
   for (int face = 0; face < 6; ++face) {

@@ -1,8 +1,8 @@
 // A solid box.
 //
-// The face through which the proxy's straight way enters holds it, and it slides on that face by (4). Beyond the face's
-// edge it is free again, so it can go around the box. If friction would hold the proxy beside the entered face, beyond
-// an edge that p isn't beyond, that edge holds it (edge_contact.hpp).
+// The face through which the proxy's straight way enters holds it by (4). Beyond the face's edge it is free again, so
+// it can go around the box. If friction would hold the proxy beside the entered face, beyond an edge that p isn't
+// beyond, that edge holds it (edge_contact.hpp).
 #pragma once
 
 #include <array>

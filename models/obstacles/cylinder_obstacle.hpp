@@ -1,7 +1,7 @@
 // A solid cylinder with flat ends.
 //
-// It works like a box: the side or end through which the proxy enters holds it; the proxy slides there exactly and is
-// free beyond the rim. A proxy that friction would hold beside that face is held at the rim (edge_contact.hpp).
+// It works like a box: the side or end through which the proxy enters holds it, and beyond the rim it is free. A proxy
+// that friction would hold beside that face is held at the rim (edge_contact.hpp).
 #pragma once
 
 #include "models/obstacles/plane_obstacle.hpp"

@@ -43,9 +43,9 @@ void MovingObstacle::set_time(double time_s, double period_s) noexcept {
   shortened_ = shorter;
 }
 
-// Returns q in the object's frame, carried along by the object's motion. Order 2 asks a second time, from
-// q̃ = q₁ + (q₁ − q₂)/3 and over 2T/3. If the object's motion isn't uniform, q̃ may be behind a mesh. The result is
-// then the point that a step from q₁ towards q̃ reaches.
+// Returns q in the object's frame, carried along by the object's motion. At order 2 a second call in a step comes from
+// q̃ = q₁ + (q₁ − q₂)/3, with the period 2T/3. If the object's motion isn't uniform, q̃ may be behind a mesh. The
+// result is then the point that a step from q₁ towards q̃ reaches.
 Vec3 MovingObstacle::from(const Vec3& q) const noexcept {
   const Vec3 q_O = before_inverse_ * q;
   if (!shortened_) {
@@ -60,9 +60,9 @@ Vec3 MovingObstacle::from(const Vec3& q) const noexcept {
 Vec3 MovingObstacle::to_W(const Vec3& r_O, const Vec3& q_O, const Vec3& q) const noexcept {
   if (rests_ && r_O == q_O) return q;
   Vec3 r = now_ * r_O, moved = r_O, normal;
-  // The next step takes r back to the object's frame, with rounding. If r_O is within rounding of a face that it
-  // doesn't touch (beside a vertex, deep in a spike), that face may lie between r_O and its image. r then moves away
-  // from that face, farther with each try; 24 tries add up to 8190 times the first distance.
+  // The next step takes r back to the object's frame, with rounding. If r_O is within rounding of an untouched face
+  // (beside a vertex, deep in a spike), that face may lie between r_O and its image. r then moves away from that face,
+  // farther with each try; 24 tries add up to 8190 times the first distance.
   double away = 16.0 * std::numeric_limits<double>::epsilon() * (r.lpNorm<1>() + now_.translation().lpNorm<1>());
   for (int k = 0; k < 24 && still_->parts(r_O, now_inverse_ * r, normal); ++k) {
     moved += away * normal;

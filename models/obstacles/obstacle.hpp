@@ -1,7 +1,7 @@
 // The interface of an object in a World.
 //
-// A World asks each obstacle near the step what it would do alone, and combines those that matter by their tangent
-// planes. A new kind of object implements this interface, as meshes and moving objects do.
+// A World asks each obstacle near the step for its step alone, and combines those that matter by their tangent planes.
+// New kinds of objects implement this interface, as meshes and moving objects do.
 #pragma once
 
 #include <array>
@@ -68,8 +68,8 @@ class Obstacle {
   // Whether the straight way from x to y enters the object by more than rounding. Precondition: the proxy may be at x.
   [[nodiscard]] virtual bool bars(const Vec3& x, const Vec3& y) const noexcept = 0;
 
-  // The point at which a proxy that goes around the object leaves its surface, on the way from q to p; q if there is no
-  // such point. A proxy goes around if step() doesn't touch although the straight way passes through the inside.
+  // The point at which a proxy that goes around the object leaves its surface, on the way from q to p; q if there is
+  // none. A proxy goes around if step() doesn't touch although the straight way passes through the inside.
   [[nodiscard]] virtual Vec3 detour(const Vec3& /*p*/, const Vec3& q) const noexcept { return q; }
 
   // The tangent plane at the surface point nearest to r; `feature` is the one that step() returned.

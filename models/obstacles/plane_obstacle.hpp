@@ -40,9 +40,9 @@ class PlaneObstacle final : public Obstacle {
   }
   [[nodiscard]] double distance(const Vec3& x) const noexcept override { return surface_.height(x); }
   void set_friction(double friction) noexcept override { mu_ = friction; }
-  // A point may be behind the surface by this many units of rounding. 1 is right for a single surface. Two half-spaces
-  // back to back (a plane guide) need about 8: a point on one is behind the other by the rounding of both. Beyond 500
-  // (1e-12 m within a metre) the contract's "never inside" would fail.
+  // A point may be behind the surface by this many units of rounding: 1 for a single surface, about 8 for two
+  // half-spaces back to back (a plane guide), where a point on one is behind the other by the rounding of both. Beyond
+  // 500 (1e-12 m within a metre) the contract's "never inside" would fail.
   void set_slack(double roundings) noexcept { slack_ = roundings; }
   [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
 

@@ -57,8 +57,8 @@ struct SegmentCore {
       : a(from), end((to - from).norm()), e(end > 0.0 ? Vec3((to - from) / end) : Vec3(Vec3::UnitZ())) {}
 
   [[nodiscard]] Vec3 nearest(const Vec3& x) const noexcept { return a + std::clamp(e.dot(x - a), begin, end) * e; }
-  // The distance to a segment is the distance to its line or to one of its ends. Each of these three has a single
-  // minimum along the way; the least of them is the answer.
+  // The distance to a segment is the distance to its line or to one of its ends. Each of these has a single minimum
+  // along the way; the least is the answer.
   [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
     double best = 0.0, least = std::numeric_limits<double>::infinity();
     for (const double t :
@@ -217,8 +217,8 @@ class RoundObstacle final : public Obstacle {
     return trial;
   }
 
-  // Solves ‖f_t‖ = μ f_n for t = s − s₀. The excess ‖f_t‖ − μ f_n is −μ f_n at s = 1, which leaves no tangential force,
-  // and `excess_at_q` > 0 at s = 0; these bracket the root. In between it is nearly linear (on a plane exactly), so the
+  // Solves ‖f_t‖ = μ f_n for t = s − s₀. The excess ‖f_t‖ − μ f_n brackets the root: −μ f_n at s = 1, without
+  // tangential force, and `excess_at_q` > 0 at s = 0. In between it is nearly linear (on a plane exactly), so the
   // secant method takes a few steps.
   [[nodiscard]] Step slide(double K, const Vec3& p, const Vec3& q, double excess_at_q) const noexcept;
 

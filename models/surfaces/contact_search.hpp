@@ -19,16 +19,14 @@
 
 namespace proxarm::models {
 
-// The result of one stage of the search.
 enum class StepResult {
   no_progress,  // no set of this size is complete: try larger ones
   progress,     // a candidate was added, or the proxy has moved: start again with single contacts
   arrived,      // a complete set was found
 };
 
-// Runs the stages (singles, pairs, triples, …; each returns a StepResult) until one arrives or all make no progress.
-// Returns whether one arrived. Calls `begin_round` before the first stage of each round and gives up if that returns
-// false.
+// Runs the stages (singles, pairs, triples, …) until one arrives or all make no progress. Returns whether one arrived.
+// Calls `begin_round` before each round's first stage and gives up if that returns false.
 template <typename BeginRound, typename... Stages>
 bool search_contacts(BeginRound begin_round, Stages... stages) noexcept {
   StepResult result = StepResult::progress;
@@ -67,7 +65,7 @@ StepResult try_each_triple(const std::size_t& count, Attempt attempt) noexcept {
 }
 
 // The best of several complete sets of one size: the one that leaves the proxy nearest to p. If Coulomb's law has
-// several solutions, this choice depends least on K.
+// several solutions, this one depends least on K.
 struct NearestSet {
   double distance2 = std::numeric_limits<double>::infinity();  // ‖r − p‖²
   Vec3 r = Vec3::Zero();

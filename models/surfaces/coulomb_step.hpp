@@ -43,8 +43,8 @@ class CoulombStep {
         Vec<N> r;
         if (slip(F_ / pull, pull, r)) return r;
       }
-      // The proxy can't rest at q: q is behind a surface (possible for the reference of order 2), or an object carries
-      // the proxy away. Then r(τ) doesn't end in q, and the medium's force grows without bound, so a bracket exists.
+      // The proxy can't rest at q: q is behind a surface (possible at order 2), or an object carries the proxy away.
+      // Then r(τ) doesn't end in q, and the medium's force grows without bound, so a bracket exists.
       while (high.excess < 0.0 && 1.0 - high.tau > 1e-15) {
         low = high;
         high = at(1.0 - 0.1 * (1.0 - high.tau));
@@ -74,8 +74,7 @@ class CoulombStep {
   }
 
   // (3), second case: the proxy ends without contact. Tries the exact end (attempt 0) and ends some units in the last
-  // place beside it (attempts `first` to `last`): past the middle of a ball, 𝒢' may find one point free and its
-  // neighbour blocked.
+  // place beside it: past the middle of a ball, 𝒢' may find one point free and its neighbour blocked.
   bool goes_free(int first, int last, Vec<N>& r) noexcept {
     const double share = (kappa_ * size_ - F_) / (kappa_ * size_);  // fraction of the way from q to p; NaN for p = q
     if (!(share > 0.0)) return false;
@@ -146,8 +145,8 @@ class CoulombStep {
     return std::abs(sample.excess) <= rounding_N(sample.r);
   }
 
-  // Evaluates 𝒢' once more so that rest.contacts() are the contacts at q: first at a sample as near to q as rounding
-  // allows, then, if that has no contacts, at the first sample's τ.
+  // Evaluates 𝒢' once more so that rest.contacts() are the contacts at q: as near to q as rounding allows or, without
+  // contacts there, at the first sample's τ.
   void touch_at_rest() noexcept {
     at(1.0 - std::min(1e6 * u * (p_.template lpNorm<1>() + q_.template lpNorm<1>()) / size_, 1.0 - held_at));
     if (rest_.contacts().empty()) at(held_at);
@@ -173,8 +172,8 @@ class CoulombStep {
     return std::abs(last_.excess) <= rounding_N(last_.r);
   }
 
-  // If 𝒢' has several solutions (a push straight through a ball's middle, two faces of a box), r(τ) jumps from one to
-  // another, and F may lie within the jump. Each solution by itself is smooth in τ; its contacts identify it.
+  // If 𝒢' has several solutions (a push straight through a ball's middle, two faces of a box), r(τ) jumps between them,
+  // and F may lie within a jump. Each solution by itself is smooth in τ; its contacts identify it.
   struct Answer {
     std::uint64_t touches = 0;
     Sample low{.tau = -1.0, .excess = 0.0, .r = {}}, high{.tau = 2.0, .excess = 0.0, .r = {}};

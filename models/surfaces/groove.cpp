@@ -61,9 +61,9 @@ struct CrossSection {
   }
 };
 
-// The root of g between lo and hi. Precondition: g(lo) ≤ 0 ≤ g(hi). Usually q is in the line, up to the surfaces'
-// curvature, and g is nearly linear around the closed form's solution: the secant method then takes a few steps. If it
-// fails, false position (the Illinois variant) follows, with a bisection every fourth step.
+// The root of g between lo and hi. Precondition: g(lo) ≤ 0 ≤ g(hi). Usually g is nearly linear around the closed form's
+// solution, and the secant method takes a few steps. If it fails, false position (the Illinois variant) follows, with a
+// bisection every fourth step.
 double root(const CrossSection& c, double lo, double hi) noexcept {
   const double small = 2.0 * std::numeric_limits<double>::epsilon() * (std::abs(c.s_p) + std::abs(c.s_q[0]));
   double at = std::clamp(c.guess(), lo, hi), g_at = c.at(at).g, next = std::clamp(at - g_at, lo, hi);
@@ -174,7 +174,7 @@ class Groove {
 
   // A contact with w = 0 need not slip across the line, so it may stick while the other slips. Returns true if one
   // sticks: the solution is then accepted, or none exists because a contact pulls. Otherwise narrows lo and hi to the
-  // side to which that contact is pushed; the root is there.
+  // side of the root, to which that contact is pushed.
   bool one_sticks(const CrossSection& c, double& lo, double& hi) noexcept {
     for (int i = 0; i < 2; ++i) {
       if (c.w[i] != 0.0 || !(c.mu[i] > 0.0) || c.s_q[i] < lo || c.s_q[i] > hi) continue;

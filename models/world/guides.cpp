@@ -12,8 +12,8 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 // The longest push, as a multiple of the object's motion at q. The push is that motion over the sine of the angle
-// between surface and guide, so ten allows angles down to about 6°. At smaller angles the object would throw the proxy
-// far along the guide.
+// between surface and guide, so ten allows angles down to about 6°; below, the object would throw the proxy far along
+// the guide.
 constexpr double longest_push = 10.0;
 
 // Whether a proxy that the object has carried to `carried` may end at x, outside the object.

@@ -10,9 +10,9 @@
 
 namespace proxarm::models {
 
-// Each new tangent plane shrinks the error by the factor penetration / radius, so steps of micrometres need two or
-// three. 60 suffice for penetrations up to about half the radius. For deeper tools there is often no fixed point, and
-// the set of contacts is given up.
+// Each new tangent plane shrinks the error by penetration / radius, so steps of micrometres need two or three. 60
+// suffice for penetrations up to about half the radius; deeper tools often have no fixed point, and the set of contacts
+// is given up.
 inline constexpr int most_settling = 60;
 
 // Whether r has settled as far as rounding allows. A move of less than 1e-9 of the coordinates no longer tilts tangent

@@ -75,8 +75,8 @@ class FlatSupport {
   }
 
   // By Assumption 1 a contact's force is the same for every stiffness, so Newton's method may use another one. It tries
-  // K first, then stiffnesses that keep the points p_i near their surfaces, where the equations are closer to linear.
-  // Forces found with another stiffness are exact only to its rounding; a few steps with K finish.
+  // K first, then stiffnesses that keep the points p_i near their surfaces, where the equations are closer to linear; a
+  // few steps with K then remove the other stiffness's rounding.
   bool solve(double K, const Vec3& p) noexcept {
     const std::array<Vec3, most> start = x;
     double k = 0.0;
@@ -101,9 +101,8 @@ class FlatSupport {
   enum class Haste : std::uint8_t { few_steps, none };
   static constexpr int most_steps = 40, bold_steps = 8, most_stuck = 4;
 
-  // Newton's method. The first steps are always taken (`bold`), because the way to the right pieces of (4) may lead
-  // over larger residuals. Later steps are taken only if they reduce the residual; otherwise Gauss–Seidel sweeps take
-  // over.
+  // Newton's method. The first steps are always taken (`bold`): the way to the right pieces of (4) may lead over larger
+  // residuals. Later steps must reduce the residual; otherwise Gauss–Seidel sweeps take over.
   bool solve_from_here(double K, const Vec3& p, Haste haste) noexcept {
     double apart = evaluate(K, p);
     int stuck = 0;
@@ -168,8 +167,8 @@ class FlatSupport {
   }
 
   // One Newton step with backtracking, for the linear system (D_i − I) Σ dx_j − D_i dx_i/σ = −R_i for all i, σ =
-  // stiffer_. Returns true if the residual `apart` went down by at least a quarter of the step's share. With `bold`,
-  // takes the full step and returns true in any case. If it returns false, the forces are unchanged.
+  // stiffer_. Returns true if the residual `apart` went down by at least a quarter of the step's share; otherwise the
+  // forces are unchanged. With `bold`, takes the full step and returns true.
   bool step(double K, const Vec3& p, double& apart, bool bold) noexcept {
     budget -= static_cast<int>(count * count * count);
     const Eigen::Index n = 3 * static_cast<Eigen::Index>(count);

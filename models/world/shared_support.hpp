@@ -28,8 +28,8 @@ struct SharedSupport {
                                             // presses
   std::size_t count = 0;
   Vec3 r = Vec3::Zero();
-  // What solve() may still spend, in units of about 40 ns; solve() deducts its cost. The whole budget is 0.4 ms. A step
-  // that needs more would endanger a cycle of 1 ms, so its set is given up and counted as unresolved.
+  // What solve() may still spend, in units of about 40 ns; solve() deducts its cost. The whole budget is 0.4 ms. More
+  // would endanger a cycle of 1 ms, so the set is then given up and counted as unresolved.
   static constexpr int whole_budget = 10'000;
   int budget = whole_budget;
 

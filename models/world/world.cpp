@@ -202,7 +202,7 @@ double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
   near_.resize(near_fixed_);
   if (!((middle - near_centre_).norm() + radius <= near_radius_)) {
     // Twice the radius plus a millimetre, so that a proxy in contact, which moves by micrometres, rarely asks the tree.
-    // A larger margin would make each step test more obstacles.
+    // More would make each step test more obstacles.
     near_radius_ = 2.0 * radius + 1e-3;
     near_centre_ = middle;
     near_.clear();
@@ -407,8 +407,8 @@ void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<
   }
 }
 
-// In a crowd, tries single obstacles, then the set that would hold the proxy without friction. These come before all
-// other sets, because each set that fails brings in more of the crowd.
+// In a crowd, tries single obstacles, then the set that would hold the proxy without friction. Other sets come later,
+// because each that fails brings in more of the crowd.
 bool World::try_likely(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
   try_singles(K, p, q, candidates, choice);
   if (choice.found() || likely_count_ < 2) return choice.found();
@@ -530,7 +530,7 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexce
   candidates.around = true;
   if (search(K, p, q, candidates, choice)) return choice.resolved;
   // Beyond the radius of a curved surface, or on a long step past several objects, the iteration on tangent planes may
-  // find nothing. The proxy then goes as far as a shorter step leads: the way to p is halved up to six times.
+  // find nothing. The proxy then goes as far as a shorter step leads: p is moved halfway towards q, up to six times.
   Vec3 nearer = p;
   for (int k = 0; k < 6 && !choice.found(); ++k) {
     nearer = 0.5 * (nearer + q);

@@ -61,9 +61,8 @@ class World final : public GeometricAlgorithm<3> {
   [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
 
  private:
-  // The obstacles that may be part of the solution, and their steps alone. Up to three contacts hold a proxy, and
-  // typical steps have one to three candidates. Candidates beyond the twelfth are dropped; the step counts as
-  // unresolved if no set of the twelve is complete.
+  // The obstacles that may be part of the solution, and their steps alone. Typical steps have one to three. Candidates
+  // beyond the twelfth are dropped; the step counts as unresolved if no set of the twelve is complete.
   struct Candidates {
     static constexpr std::size_t most = 12;
     std::array<std::size_t, most> index{};
@@ -118,7 +117,7 @@ class World final : public GeometricAlgorithm<3> {
   BoundsTree tree_;                     // all others
   std::vector<bool> elastic_;           // for each obstacle: whether it has an elastic layer
   bool soft_ = false;                   // whether any has
-  // The obstacles that a step may meet. First the resting ones within near_radius_ of near_centre_, gathered anew only
+  // The obstacles that a step may meet: first the resting ones within near_radius_ of near_centre_, gathered anew only
   // when a step leaves that ball; then the moving ones that are close in this step.
   std::vector<std::size_t> near_;
   std::size_t near_fixed_ = 0;
