@@ -28,7 +28,7 @@ class CoulombField final : public GeometricAlgorithm<N> {
     const Vec<N> d = p - q;
     const double distance = d.norm(), reach = F_ / K;
     // Written as "not greater", so that a distance whose square underflows sticks.
-    if (!(distance > reach)) return q;  // (3), first case: bit for bit
+    if (!(distance > reach)) return q;  // (3), first case: q itself, bit for bit
     return p - (reach / distance) * d;  // (3), second case
   }
   [[nodiscard]] bool wants_time() const noexcept override { return false; }

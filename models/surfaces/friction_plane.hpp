@@ -40,7 +40,7 @@ FaceStep<N> step_on_face(const FlatSurface<N>& surface, double mu, const Vec<N>&
   const Vec<N> q_sf = on_surface ? q : Vec<N>(q - n * n_q);
   const Vec<N> d = p_sf - q_sf;
   const double distance2 = d.squaredNorm(), reach = -mu * n_p;
-  // Written as "not greater", so that a distance whose square underflows sticks and isn't divided by.
+  // Written as "not greater", so that a distance whose square underflows sticks, and no step divides by zero.
   if (!(distance2 > reach * reach))
     return {on_surface ? q : surface.projection(q_sf), true, false};  // (4), second case
 

@@ -151,7 +151,7 @@ class Groove {
     out_.found = true;
     const double reach = a_.mu * std::max(0.0, f_1_) + b_.mu * std::max(0.0, f_2_), d = s_p_ - s_q_[0];
     if (std::abs(d) <= reach) {
-      out_.r = a_.surface.holds(a_.q) && b_.surface.holds(a_.q) ? a_.q : place(s_q_[0]);  // sticks: bit for bit
+      out_.r = a_.surface.holds(a_.q) && b_.surface.holds(a_.q) ? a_.q : place(s_q_[0]);  // sticks: q itself
       return;
     }
     out_.slips1 = a_.mu > 0.0;
