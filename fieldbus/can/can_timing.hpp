@@ -1,4 +1,4 @@
-// How long a CAN frame occupies its bus: exactly, from its own bits, and the published bounds for planning.
+// How long a CAN frame occupies its bus: the exact time from its bits, and published bounds for planning.
 //
 // Classic frame, n data bytes (ISO 11898-1; one column per bit count):
 //   11-bit: SOF 1, id 11, RTR 1, IDE 1, r0 1, DLC 4, data 8n, CRC 15                                       = 34 + 8n

@@ -74,7 +74,7 @@ std::string LeaderWatch::signs() const {
 
 namespace {
 
-// Listens for all of the time; a watch for each bus.
+// Listens for all of time_ns, with one watch per bus.
 std::vector<LeaderWatch> listen(CanNetwork& network, std::span<const BusToLead> buses, Listening listening,
                                 std::int64_t time_ns, const FrameHandler& other) {
   std::vector<LeaderWatch> watches;
