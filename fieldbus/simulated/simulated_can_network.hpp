@@ -67,8 +67,8 @@ class SimulatedCanNetwork final : public CanNetwork {
   std::int64_t waited_ns_ = 0;  // by the machine's clock
   std::vector<std::unique_ptr<SimulatedCanBus>> buses_;
   bool real_time_ = false;
-  std::int64_t real_time_offset_ns_ = 0,
-               woken_late_ns_ = 0;  // real_time_offset_ns_: monotonic clock minus virtual time
+  // real_time_offset_ns_ is the monotonic clock minus virtual time.
+  std::int64_t real_time_offset_ns_ = 0, woken_late_ns_ = 0;
 };
 
 }  // namespace proxarm::fieldbus
