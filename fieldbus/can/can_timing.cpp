@@ -6,8 +6,7 @@ namespace proxarm::fieldbus {
 namespace {
 
 // Bit stuffing as a machine of eight states: the value of the last bit on the wire (bit 2), and the length of its run
-// of equal bits, less one (bits 0, 1). The fifth equal bit is followed at once by its stuff bit, so a run of five is no
-// state.
+// of equal bits, less one (bits 0, 1). The step that adds a fifth equal bit also adds its stuff bit.
 struct StuffStep {
   int state;
   int stuff_bits;

@@ -140,8 +140,7 @@ class ObjText {
     require(announced_faces_, mesh_.account().faces, " faces");
   }
 
-  // OBJ has no end mark. A file is cut off if only its last line has no end, and vertices follow the last one that a
-  // face uses.
+  // OBJ has no end mark. So a file counts as cut off if its last line has no line end and its last vertices are unused.
   void require_ended(const FaceAccount& account) const {
     const bool ended = bytes_.empty() || bytes_.back() == '\n' || bytes_.back() == '\r';
     if (ended || account.unused_vertices == 0 || highest_ + 1 == static_cast<std::int64_t>(account.vertices)) return;

@@ -79,7 +79,7 @@ class SimulatedCell final : private Clockwork {
   [[nodiscard]] std::vector<ModbusUnit*> modbus_devices(const std::string& line);
   [[nodiscard]] std::unique_ptr<fieldbus::ModbusClient> modbus_client(const std::string& line);
 
-  // Connects each node to the bus with its bus's name.
+  // Connects each node to the network's bus of the same name.
   void attach_to(fieldbus::SimulatedCanNetwork& network);
 
   // Starts all devices, the physics and the devices' clocks at the event queue's present time.
