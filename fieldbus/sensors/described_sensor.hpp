@@ -123,9 +123,8 @@ class DescribedSensor final : public ForceSensor {
   CanFrame poll_frame_{};
 
   // Cycle.
-  std::array<std::uint8_t, description::max_sample_bytes + 8>
-      sample_{};          // with a margin, as a slice may be read past the end
-  std::size_t next_ = 0;  // slot of the next frame; 0: the first
+  std::array<std::uint8_t, description::max_sample_bytes + 8> sample_{};  // a slice may be read past the end
+  std::size_t next_ = 0;                                                  // slot of the next frame; 0: the first
   std::int64_t begun_ns_ = 0;
   bool torn_ = false;                             // the order of the next sample isn't certain
   std::int64_t poll_ns_ = 0, older_poll_ns_ = 0;  // the last poll and the one before
