@@ -208,7 +208,7 @@ void give_reasons(BusPlan& plan) {
       need = "the frames take " + need + " at worst";
     }
     plan.reasons.push_back(need + ", a cycle has " + microseconds(plan.period_ns));
-    return;  // every frame is late then, and a list of them wouldn't help
+    return;  // a list of all late frames wouldn't help
   }
   for (const FramePlan& frame : plan.frames) {
     if (!frame.bounded) {
@@ -220,7 +220,7 @@ void give_reasons(BusPlan& plan) {
   }
 }
 
-// The shortest timestep above the given one that fits, in steps of 0.25 ms.
+// The shortest timestep that fits, above the given one, in steps of 0.25 ms.
 std::optional<std::int64_t> shortest_period(const PlannedBus& bus, std::int64_t above_ns) {
   constexpr std::int64_t quarter = 250'000, longest = 20'000'000;
   for (std::int64_t period_ns = (above_ns / quarter + 1) * quarter; period_ns <= longest; period_ns += quarter) {
@@ -232,7 +232,7 @@ std::optional<std::int64_t> shortest_period(const PlannedBus& bus, std::int64_t 
   return std::nullopt;
 }
 
-// Number of buses over which the frames could be shared out evenly. Each bus needs the SYNC.
+// Number of buses that could share the frames evenly. Each bus needs the SYNC.
 std::optional<int> enough_buses(const PlannedBus& bus, const BusPlan& plan) {
   const BitRates rates{bus.bitrate, bus.data_bitrate};
   std::int64_t sync_ns = 0;

@@ -36,16 +36,15 @@ struct PlannedFrame {
   std::string name;  // unique on its bus
   std::uint32_t id = 0;
   FrameShape shape{};
-  std::string sender{};  // a sender's frames leave in the order in which they are queued
+  std::string sender{};  // a sender's frames leave in the order of queuing
 
-  // When the frame is queued: at `release` (fraction of the period after the cycle's start) or, with `after`, when that
-  // frame has arrived; plus delay_ns to latest_delay_ns. Frames that a sender queues at the same time leave in the
-  // order of the list.
+  // Queued at `release` (fraction of the period after the cycle's start) or, with `after`, when that frame has arrived;
+  // plus delay_ns to latest_delay_ns. Frames queued at the same time leave in the order of the list.
   double release = 0.0;
   std::string after{};
   std::int64_t delay_ns = 0;
   std::int64_t latest_delay_ns = 0;  // below delay_ns: the same as delay_ns
-  bool any_time = false;             // queued at any time, not in step with the cycle: heartbeats, SDO, emergencies
+  bool any_time = false;             // not in step with the cycle: heartbeats, SDO, emergencies
   int every_cycles = 1;              // sent once in this many cycles
   std::int64_t every_ns = 0;  // any_time: by the sender's clock, as a streaming sensor does; 0: every_cycles counts
 
@@ -68,9 +67,9 @@ struct FramePlan {
   bool extended = false;
   std::int64_t wire_ns = 0;      // its longest time on the wire
   std::int64_t response_ns = 0;  // worst case, from queuing to the end of the frame
-  std::int64_t finish_ns = 0;    // worst case, from the cycle's start (any_time: same as response_ns)
+  std::int64_t finish_ns = 0;    // worst case, from the cycle's start (any_time: response_ns)
   std::int64_t deadline_ns = 0;
-  bool bounded = true;  // false: it can wait for more than a period; the figures above are then meaningless
+  bool bounded = true;  // false: it can wait longer than a period, and the figures above are meaningless
   [[nodiscard]] bool in_time() const noexcept { return bounded && finish_ns <= deadline_ns; }
 };
 
@@ -90,7 +89,7 @@ struct BusPlan {
   double typical_load = 0.0;        // the same with usual data, stuff bits included
   std::int64_t sync_jitter_ns = 0;  // the longest other frame, which can hold the SYNC back
   std::vector<FramePlan> frames;
-  std::vector<std::string> outranking_sync;  // names of the frames with a higher priority than the SYNC
+  std::vector<std::string> outranking_sync;  // frames with a higher priority than the SYNC
   bool fits = false;
   std::vector<std::string> reasons;       // why it doesn't fit, with figures
   std::vector<std::string> alternatives;  // changes with which it would fit
@@ -101,10 +100,10 @@ struct BusPlan {
 // twice, an `after` that doesn't exist or leads in a circle, a CAN FD frame on a classic bus.
 [[nodiscard]] BusPlan plan_bus(const PlannedBus& bus, std::int64_t period_ns);
 
-// A table for the user, several lines, with a final newline.
+// A table of several lines for the user.
 [[nodiscard]] std::string plan_text(const BusPlan& plan);
 
-// For SetupError and --timestep: one line with what is needed, what is available and what would fit. Empty if all fit.
+// One line with what is needed, what is available and what would fit. Empty if all fit.
 [[nodiscard]] std::string refusal_text(const std::vector<BusPlan>& plans);
 
 }  // namespace proxarm::fieldbus

@@ -44,7 +44,7 @@ class Analysis {
   }
 
   std::vector<FrameWindow> run() {
-    // Start from an empty bus. A frame can come after one that is listed later, hence as many passes as frames.
+    // Start from an empty bus. A frame can come after one listed later, hence as many passes as frames.
     for (std::size_t pass = 0; pass < frames_.size(); ++pass) {
       for (std::size_t m = 0; m < frames_.size(); ++m) {
         windows_[m] = release_of(m);
@@ -62,7 +62,7 @@ class Analysis {
  private:
   [[nodiscard]] std::size_t trigger(std::size_t m) const { return static_cast<std::size_t>(triggers_[m]); }
 
-  // A frame that comes after one out of step is out of step, too, and as rare.
+  // A frame that comes after one out of step is out of step, too, and isn't sent more often.
   void inherit_phase() {
     for (std::size_t pass = 0; pass < frames_.size(); ++pass) {
       for (std::size_t m = 0; m < frames_.size(); ++m) {
@@ -74,7 +74,7 @@ class Analysis {
     }
   }
 
-  // True if the frame's time in the cycle is known, even if it isn't sent in every cycle.
+  // True if the frame's time in the cycle is known; it may not be sent in every cycle.
   [[nodiscard]] bool in_step(std::size_t k) const { return !frames_[k].any_time; }
   [[nodiscard]] std::int64_t every_ns(std::size_t k) const {
     return frames_[k].every_ns > 0 ? frames_[k].every_ns : period_ns_ * frames_[k].every_cycles;
@@ -124,7 +124,7 @@ class Analysis {
     return false;
   }
 
-  // True if the same sender queues both at the same time, so that the order of the list decides.
+  // True if one sender queues both at the same time, so that the order of the list decides.
   [[nodiscard]] bool queued_together(std::size_t a, std::size_t b) const {
     return frames_[a].sender == frames_[b].sender && triggers_[a] == triggers_[b] && in_step(a) && in_step(b) &&
            frames_[a].release == frames_[b].release && frames_[a].delay_ns == frames_[b].delay_ns &&
@@ -155,8 +155,8 @@ class Analysis {
     }
     for (std::size_t k = 0; k < frames_.size(); ++k) {
       const bool same_sender = frames_[k].sender == frames_[m].sender;
-      // (No frame that can precede m has a priority below the weakest.) A frame of the same sender that ended before m
-      // was queued still belongs to the busy period: it may have made others wait.
+      // (No frame that can precede m has a priority below the weakest.) A frame of m's sender that ended before m was
+      // queued still belongs to the busy period, as it may have delayed others.
       if (k == m || priority_[k] > level.weakest) continue;
       Competitor competitor{k, same_sender, leads_to(m, k) || (queued_together(k, m) && k > m), false, 0};
       for (std::size_t l = 0; l < frames_.size(); ++l) {
@@ -239,9 +239,8 @@ class Analysis {
     }
   }
 
-  // Examines all busy periods that can contain m. Each begins with the release of one of its frames. A busy period that
-  // begins later with the same frames also ends later. So it is enough to try the last times at which a frame can still
-  // be in it.
+  // Examines all busy periods that can contain m. Each begins with the release of one of its frames. If it begins later
+  // with the same frames, it also ends later. So it is enough to try the last times at which a frame can be in it.
   void examine_in_step(std::size_t m, const Level& level) {
     const FrameWindow own = windows_[m];
     const std::int64_t latest_ns = own.release_ns + own.jitter_ns;
@@ -274,7 +273,7 @@ class Analysis {
     const std::int64_t from_ns = windows_[first.frame].release_ns + n * period_ns_;
     const std::int64_t to_ns = from_ns + first.jitter_ns;
     const PlannedFrame& frame = frames_[first.frame];
-    // A frame queued at the very end of another takes part in the next arbitration, so no frame on the wire blocks it.
+    // A frame queued at the very end of another takes part in the next arbitration, so no other frame blocks it.
     const bool at_end = triggers_[first.frame] >= 0 && frame.delay_ns == 0 && frame.latest_delay_ns <= 0;
     std::int64_t blocking_ns = 0;
     if (first.held_back) {

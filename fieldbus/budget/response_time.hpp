@@ -1,4 +1,4 @@
-// Worst-case response time of each frame of a bus under arbitration. Part of bus_budget, which has the equations.
+// Worst-case response time of each frame of a bus. Part of bus_budget, which has the equations.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Load statistics of a simulated bus: busy time, load, and the worst response time of each identifier, to be compared
-// with the predictions of bus_budget.hpp.
+// Load of a simulated bus and worst response time of each identifier, to be compared with the predictions of
+// bus_budget.hpp.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ struct IdentifierStatistics {
   std::uint32_t id = 0;
   bool extended = false;
   std::uint64_t frames = 0;
-  int least_bits = 0;  // on the wire, bits at both bitrates together, interframe space included
+  int least_bits = 0;  // bits at both bitrates together, interframe space included
   int most_bits = 0;
   std::int64_t worst_response_ns = 0;  // from the call of send() to the end of the frame, without the interframe space
 };
@@ -38,8 +38,8 @@ class BusStatistics {
   [[nodiscard]] double load(std::int64_t now_ns) const noexcept;
   // Largest load of any complete window of window_ns since reset(). Windows don't overlap.
   [[nodiscard]] double peak_load() const noexcept;
-  // How often two nodes began the same identifier at the same moment, which is an error on a real bus. The frame of the
-  // node that was attached first was sent.
+  // How often two nodes began the same identifier at the same moment, an error on a real bus. The frame of the node
+  // attached first was sent.
   [[nodiscard]] std::uint64_t collisions() const noexcept { return collisions_; }
   // In order of first appearance.
   [[nodiscard]] const std::vector<IdentifierStatistics>& identifiers() const noexcept { return identifiers_; }

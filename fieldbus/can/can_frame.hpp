@@ -1,4 +1,4 @@
-// The CAN frame type used everywhere in proxarm: classic or FD, 11- or 29-bit identifier.
+// A CAN frame: classic or FD, 11- or 29-bit identifier.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ struct CanFrame {
   std::uint32_t id = 0;          // 11 or 29 bits, without flag bits
   bool extended = false;         // 29-bit identifier
   bool remote = false;           // remote request (classic only), without data
-  bool error = false;            // the interface reports a bus error (SocketCAN error frame); no frame was on the wire
+  bool error = false;            // reported bus error (SocketCAN error frame); no frame was on the wire
   bool fd = false;               // CAN FD frame format
   bool bit_rate_switch = false;  // FD: data phase at the higher bitrate
   std::uint8_t length = 0;

@@ -16,7 +16,7 @@ namespace proxarm::fieldbus {
 enum class SendResult : std::uint8_t {
   sent,        // queued at the interface, or on the wire
   queue_full,  // ENOBUFS: nothing was queued
-  bus_off,     // the controller is off the bus; its queue was purged
+  bus_off,     // the controller is off the bus; its queue is purged
   down,        // interface down or removed
   refused,     // the bus can't carry this frame (CAN FD on a classic bus, invalid length)
 };
@@ -42,14 +42,14 @@ class CanBus {
   virtual ~CanBus() = default;
 
   virtual SendResult send(const CanFrame& frame) noexcept = 0;
-  // Sends these frames in order, in one system call where the bus supports that; results[i] belongs to frames[i]. A
-  // failed frame doesn't keep the following ones from being sent. now_ns is the caller's reading of the clock, for
-  // implementations that record frames.
+  // Sends these frames in order, in one system call if possible; results[i] belongs to frames[i]. A failed frame
+  // doesn't stop the following ones. now_ns is the caller's reading of the clock, for implementations that record
+  // frames.
   virtual void send_all(std::span<const CanFrame> frames, [[maybe_unused]] std::int64_t now_ns,
                         SendResult* results) noexcept {
     for (std::size_t i = 0; i < frames.size(); ++i) results[i] = send(frames[i]);
   }
-  // Takes the oldest received frame; false if there is none. Frames sent by this side aren't received.
+  // Takes the oldest received frame; false if there is none. Own frames aren't received.
   virtual bool receive(TimedFrame& out) noexcept = 0;
   [[nodiscard]] virtual const BusStatus& status() const noexcept = 0;
   // The interface ("vcan0"), or the bus's name in the cell.
@@ -70,12 +70,11 @@ class CanNetwork {
   [[nodiscard]] virtual std::int64_t now_ns() const noexcept = 0;
   // Returns at the deadline (absolute time) or just after it.
   virtual void sleep_until(std::int64_t deadline_ns) noexcept = 0;
-  // Returns true as soon as any bus has a frame to receive, false at the deadline.
+  // True as soon as any bus has a frame to receive, false at the deadline.
   virtual bool wait_for_frame(std::int64_t deadline_ns) noexcept = 0;
-  // Time of this machine spent in wait_for_frame() so far; 0 if the implementation doesn't measure it.
+  // Real time spent in wait_for_frame() so far; 0 if not measured.
   [[nodiscard]] virtual std::int64_t waited_ns() const noexcept { return 0; }
-  // How far now_ns() lags behind the clock that it should keep pace with. Above 0 only in simulation, where time waits
-  // for a slow machine.
+  // How far now_ns() lags behind the clock it follows. Above 0 only in simulation, where time waits for a slow machine.
   [[nodiscard]] virtual std::int64_t behind_ns() const noexcept { return 0; }
 };
 

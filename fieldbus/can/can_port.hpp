@@ -1,8 +1,6 @@
-// Connects a simulated drive or sensor to its bus.
-//
-// The same device runs on an in-process bus (SimulatedCanNetwork) or, in a separate process, on a CAN interface of the
-// kernel. The owner of the bus gives the device a CanPort for sending and calls on_frame() for every frame that another
-// node sends.
+// Connects a simulated drive or sensor to its bus, an in-process bus (SimulatedCanNetwork) or, in a separate process, a
+// CAN interface of the kernel. The owner of the bus gives the device a CanPort for sending and calls on_frame() for
+// every frame of another node.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +17,7 @@ class CanPort {
   CanPort& operator=(const CanPort&) = delete;
   virtual ~CanPort() = default;
 
-  // Queues the frame behind those that this node sent earlier. Never blocks.
+  // Queues the frame behind this node's earlier ones. Never blocks.
   virtual SendResult send(const CanFrame& frame) noexcept = 0;
 };
 

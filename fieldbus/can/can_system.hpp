@@ -1,6 +1,5 @@
-// The system calls that SocketCanNetwork makes, one virtual function each. Tests override them to return ENOBUFS,
-// EAFNOSUPPORT or a lost interface on a machine without such a kernel. Semantics, results and errno are those of the
-// calls.
+// The system calls of SocketCanNetwork, one virtual function each. Tests override them to return ENOBUFS, EAFNOSUPPORT
+// or a lost interface. Semantics, results and errno are those of the calls.
 #pragma once
 
 #include <poll.h>
@@ -15,7 +14,7 @@ namespace proxarm::fieldbus {
 
 class CanSystem {
  public:
-  // The kernel's data of an interface. `kind` is the driver's link kind ("vcan", "can"), empty if it has none.
+  // `kind` is the driver's link kind ("vcan", "can"), empty if it has none.
   struct Interface {
     bool exists = false;
     unsigned index = 0;

@@ -1,5 +1,5 @@
-// Frames as text in the format of can-utils (`candump -L`), so that canplayer, python-can and other tools read our
-// records and we read theirs. One frame per line:
+// Reads and writes frames as text in the format of can-utils (`candump -L`), as canplayer, python-can and other tools
+// do. One frame per line:
 //
 //   (1436509052.249713) vcan0 044#2A366C2BBA          11-bit identifier: 3 hex digits, then the data
 //   (1436509052.449847) vcan0 1FFFFFFF#               29-bit: 8 hex digits
@@ -8,8 +8,8 @@
 //   (1436509052.949713) vcan0 20000040#0000000000000000   error frame: bit 29 of the identifier set
 //
 // The reader also accepts nanoseconds (nine digits), lower case, dots between bytes, a raw DLC ("_9" .. "_F" after
-// eight bytes), the direction that candump -x appends (R or T), blank lines, and comment lines that start with '#'.
-// Anything else is a SetupError that names the line.
+// eight bytes), the direction that candump -x appends (R or T), blank lines, and comments (lines starting with '#').
+// Other lines are SetupErrors with the line's number.
 #pragma once
 
 #include <array>
@@ -30,8 +30,8 @@ namespace proxarm::fieldbus {
 inline constexpr std::size_t max_candump_line = 192;
 using CandumpLine = std::array<char, max_candump_line>;
 
-// Writes one line, newline included, and returns its length. The name is cut at 15 characters, the limit for interface
-// names, and blanks in it become '_'; an empty name becomes "can". Times before 0 become 0. No allocation; any thread.
+// Writes one line with its newline and returns its length. The name is cut at 15 characters, the limit for interfaces,
+// and its blanks become '_'; an empty name becomes "can". Times before 0 become 0. No allocation; any thread.
 std::size_t format_candump_line(CandumpLine& out, std::int64_t time_ns, std::string_view interface,
                                 const CanFrame& frame) noexcept;
 
@@ -41,14 +41,13 @@ struct CandumpEntry {
   CanFrame frame;
 };
 
-// Writes a log file through a buffer. Not for the cycle's thread: flushing the buffer can block.
+// Writes a log file. Not for the cycle's thread: flushing the buffer can block.
 class CandumpLogWriter {
  public:
   // epoch_ns is added to every time: 0 for virtual time. Throws SetupError if the file can't be created.
   explicit CandumpLogWriter(const std::string& path, std::int64_t epoch_ns = 0);
   void write(std::int64_t time_ns, std::string_view interface, const CanFrame& frame) noexcept;
-  // Flushes and closes the file; throws SetupError if anything couldn't be written. The destructor closes the file
-  // without reporting errors.
+  // Flushes and closes the file; throws SetupError if anything couldn't be written. The destructor closes it silently.
   void finish();
 
  private:

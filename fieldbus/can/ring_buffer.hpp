@@ -1,5 +1,4 @@
-// A first-in first-out queue of fixed capacity, for frames waiting to be sent or received. All memory is allocated at
-// construction. Not thread-safe.
+// A first-in first-out queue of fixed capacity, for frames. All memory is allocated at construction. Not thread-safe.
 #pragma once
 
 #include <cstddef>

@@ -103,8 +103,8 @@ CanFrame decode(const canfd_frame& raw, bool fd) noexcept {
 
 }  // namespace
 
-// Converts the kernel's stamps to CLOCK_MONOTONIC. Reading a clock is a system call on kernels without vDSO. So all
-// buses share one reading, and the difference of the clocks is kept for a while.
+// Converts the kernel's stamps to CLOCK_MONOTONIC. Without vDSO, reading a clock is a system call. So all buses share
+// one reading, and the difference of the clocks is kept for a while.
 class SocketCanNetwork::Clocks {
  public:
   explicit Clocks(CanSystem& system) : system_(system) {}
@@ -182,7 +182,7 @@ class SocketCanNetwork::Bus final : public CanBus {
   std::array<TimedFrame, batch_size> frames_{};  // decoded; those in [next_, count_) aren't handed out yet
   std::size_t next_ = 0;
   std::size_t count_ = 0;
-  bool drained_ = false;  // the last batch emptied the socket, so the next receive() needn't ask the kernel
+  bool drained_ = false;  // the last batch emptied the socket, so the next receive() needn't ask
   std::uint32_t dropped_ = 0;
   std::int64_t last_time_ns_ = 0;
 };
@@ -250,8 +250,8 @@ void SocketCanNetwork::Bus::send_all(std::span<const CanFrame> frames, std::int6
   }
 }
 
-// sendmmsg() stops at the first frame that the kernel refuses, and reports the reason only if that frame was the first
-// of the call. So the remaining frames go with another call, until the refused frame comes first.
+// sendmmsg() stops at the first frame that the kernel refuses, and gives the reason only if it was the call's first
+// frame. So the remaining frames go with another call.
 void SocketCanNetwork::Bus::hand_over(std::size_t count, SendResult* results) noexcept {
   std::size_t done = 0;
   while (done < count) {
@@ -279,7 +279,7 @@ bool SocketCanNetwork::Bus::receive(TimedFrame& out) noexcept {
   return true;
 }
 
-// Sets the lengths again, which the kernel has overwritten.
+// The kernel has overwritten the lengths.
 void SocketCanNetwork::Bus::prepare(std::size_t i) noexcept {
   vectors_[i] = {&messages_[i].frame, sizeof(canfd_frame)};
   headers_[i].msg_hdr = {};
@@ -354,7 +354,7 @@ SocketCanNetwork::SocketCanNetwork(const std::vector<std::string>& interfaces, c
                                    CanSystem& system)
     : system_(system), clocks_(std::make_unique<Clocks>(system)) {
   if (interfaces.empty()) throw SetupError({.key = "--bus", .message = "no CAN interface named"});
-  // Check the kernel first: without CAN in it no interface can exist, and the user must know that.
+  // The kernel first: without CAN in it no interface can exist, and the user must know that.
   const int probe = system_.open_raw_can();
   if (probe < 0) refuse_kernel(interfaces.front(), errno);
   system_.close(probe);

@@ -1,4 +1,4 @@
-// CAN on Linux: the kernel's CAN interfaces (can0, vcan0) through SocketCAN raw sockets, on CLOCK_MONOTONIC.
+// CAN on Linux: CAN interfaces (can0, vcan0) through SocketCAN raw sockets, on CLOCK_MONOTONIC.
 //
 //   SocketCanNetwork network({"vcan0", "vcan0", "vcan1"});   // a name given twice is one logical bus
 //   network.bus_of(1) == 0, network.bus_of(2) == 1
@@ -9,13 +9,13 @@
 // returns error frames; they set status().state.
 //
 // A time stamp is the kernel's at reception (SO_TIMESTAMPNS, CLOCK_REALTIME), converted to CLOCK_MONOTONIC by the
-// difference of both clocks, which is read again every 10 ms. The conversion is exact to 5 µs, even while
-// CLOCK_REALTIME is slewed at its maximum rate, unless that clock was set in between. A stamp is never later than now
-// and never earlier than the previous frame's.
+// difference of both clocks, which is read again every 10 ms. That is exact to 5 µs, even while CLOCK_REALTIME is
+// slewed at its maximum rate, unless that clock was set in between. A stamp is never later than now and never earlier
+// than the previous frame's.
 //
-// After bus-off, send() refuses until the interface reports its restart: the kernel has purged its queue, and the
-// supervisor decides what is sent next. A removed interface stays `down`; an interface that was set down works again
-// once it is up.
+// After bus-off the kernel has purged its queue, and send() refuses until the interface reports its restart; the
+// supervisor then decides what is sent. A removed interface stays `down`; one that was set down works again once it is
+// up.
 #pragma once
 
 #include <cstddef>
@@ -39,7 +39,7 @@ struct CanFilter {
 struct SocketCanOptions {
   int receive_buffer_bytes =
       4 << 20;          // the default of 208 kB holds 278 frames; limited by net.core.rmem_max unless root
-  bool closed = false;  // nothing passes until set_filters(), so frames from before can't fill the buffer
+  bool closed = false;  // nothing passes until set_filters(), so earlier frames can't fill the buffer
 };
 
 class SocketCanNetwork final : public CanNetwork {
@@ -52,9 +52,8 @@ class SocketCanNetwork final : public CanNetwork {
 
   // Index of the bus for the i-th name of the list.
   [[nodiscard]] std::size_t bus_of(std::size_t listed) const noexcept { return bus_of_[listed]; }
-  // From now on the kernel passes only frames that match one of these filters; none if the list is empty. Frames
-  // already received stay. Until the first call everything passes, unless SocketCanOptions::closed is set. At most 512
-  // filters. Throws SetupError.
+  // From now on only frames that match one of these filters pass; none if the list is empty. Frames already received
+  // stay. At first everything passes, unless SocketCanOptions::closed is set. At most 512 filters. Throws SetupError.
   void set_filters(std::size_t bus, const std::vector<CanFilter>& filters);
   [[nodiscard]] bool carries_fd(std::size_t bus) const noexcept;
 
@@ -78,9 +77,9 @@ class SocketCanNetwork final : public CanNetwork {
   std::int64_t waited_ns_ = 0;
 };
 
-// True only for interfaces of kind vcan or vxcan, as the kernel reports by rtnetlink (IFLA_INFO_KIND), whatever their
-// name. sysfs wouldn't do: it also calls slcan virtual, which is a real bus on a serial line. False if the interface
-// doesn't exist. Doesn't detect a gateway (cangw) that forwards a virtual bus to a real one.
+// True only for interfaces of kind vcan or vxcan by rtnetlink (IFLA_INFO_KIND), whatever their name. sysfs also calls
+// slcan virtual, which is a real bus on a serial line. False if the interface doesn't exist. Doesn't detect a gateway
+// (cangw) that forwards a virtual bus to a real one.
 [[nodiscard]] bool is_virtual_can(const std::string& interface, CanSystem& system = CanSystem::real());
 
 }  // namespace proxarm::fieldbus

@@ -90,7 +90,7 @@ std::vector<LeaderWatch> listen(CanNetwork& network, std::span<const BusToLead> 
   return watches;
 }
 
-// Throws the problem of the first bus on which something was seen.
+// Throws `problem` for the first bus on which signs were seen.
 void refuse_if_seen(CanNetwork& network, std::span<const BusToLead> buses, const std::vector<LeaderWatch>& watches,
                     description::SetupProblem problem) {
   for (std::size_t i = 0; i < buses.size(); ++i) {

@@ -1,10 +1,10 @@
-// Listens whether another controller leads a bus already. Every command that sends on a bus does this first.
+// Listens whether another controller already leads a bus. Every command that sends on a bus does this first.
 //
 // Signs of a leader are frames that only a leader sends: SYNC (080), NMT commands (000), the heartbeat of the
 // controller's node, and for the nodes to be led setpoints (RPDO 1 to 4: 200, 300, 400, 500 + node) and SDO requests
-// (600 + node). A controller that is still at its set-up shows only by SDO requests. Frames that drives and sensors
-// send by themselves are no sign. Two controllers that begin at the same moment don't notice each other here, but in
-// their first cycles (Fault::second_master).
+// (600 + node), which alone show a controller at its set-up. Frames that drives and sensors send by themselves are no
+// sign. Two controllers that begin at the same moment detect each other only in their first cycles
+// (Fault::second_master).
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ namespace proxarm::fieldbus {
 inline constexpr std::int64_t listen_before_speaking_ns = 300'000'000;
 
 enum class Listening : std::uint8_t {
-  for_leader,  // a leader's frames: SYNC, NMT, the controller's heartbeat; setpoints and SDO requests for the nodes
-  for_nodes,   // frames of the nodes: PDOs, EMCYs, SDO answers, heartbeats
+  for_leader,  // SYNC, NMT, the controller's heartbeat; setpoints and SDO requests for the nodes
+  for_nodes,   // frames sent by the nodes: PDOs, EMCYs, SDO answers, heartbeats
 };
 
 // A bus to listen on.
@@ -50,12 +50,12 @@ class LeaderWatch {
   std::map<std::uint32_t, std::uint64_t> counts_;  // by identifier
 };
 
-// Listens for `time_ns` and throws SetupError if another controller leads one of the buses. Sends nothing. Every frame
+// Listens for `time_ns`, sending nothing; throws SetupError if another controller leads one of the buses. Every frame
 // also goes to `other`.
 void require_nobody_leads(CanNetwork& network, std::span<const BusToLead> buses,
                           std::int64_t time_ns = listen_before_speaking_ns, const FrameHandler& other = {});
-// The same for a simulation that is about to send as the nodes of a bus: throws if one of them sends already. A node
-// that is silent all that time isn't detected.
+// The same before a simulation sends as the nodes of a bus: throws if one of them already sends. Silent nodes aren't
+// detected.
 void require_nobody_plays(CanNetwork& network, std::span<const BusToLead> buses,
                           std::int64_t time_ns = listen_before_speaking_ns);
 

@@ -22,14 +22,14 @@ struct Emergency {
   std::int64_t time_ns = 0;
 };
 
-// True if the frame is this node's EMCY. Frames shorter than eight bytes occur; missing bytes read as zero. A frame
-// without an error code isn't an EMCY.
+// True if the frame is this node's EMCY. Frames may be shorter than eight bytes; missing bytes read as zero, but the
+// error code is required.
 bool decode_emcy(const CanFrame& frame, std::int64_t time_ns, std::uint8_t node, Emergency& out) noexcept;
 
-// True if the drive reports that it works on: 8120h (its CAN controller counts many errors, but still communicates),
-// 8220h (a PDO was longer than its mapping; its first bytes count), and codes of communication (81xxh) or the maker
-// (FFxxh) with an empty error register. Any other code counts as a fault: CiA 301 and 402 have no class for warnings, a
-// drive that trips reports it by EMCY first, and some drives don't fill their error register.
+// True if the drive works on: 8120h (its CAN controller counts many errors, but still communicates), 8220h (a PDO was
+// longer than its mapping; its first bytes count), and codes of communication (81xxh) or the maker (FFxxh) with an
+// empty error register. Any other code counts as a fault: CiA 301 and 402 have no warnings, a drive that trips first
+// reports it by EMCY, and some drives don't fill their error register.
 [[nodiscard]] bool is_warning(const Emergency& emergency) noexcept;
 // The wording of CiA 301 (classes) or CiA 402 (drives); the class's wording if the exact code is unknown.
 [[nodiscard]] std::string_view emcy_text(std::uint16_t code) noexcept;

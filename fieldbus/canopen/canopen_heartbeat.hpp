@@ -1,7 +1,7 @@
 // Heartbeat (CiA 301, 7.2.8.3.2.2): master and drives notice when the other stops.
 //
 // Wire: identifier 700 + node, one byte: the NMT state; 0 is the boot-up message, sent once after a reset.
-// HeartbeatProducer sends the master's heartbeat. Drives consume it (1016h) and stop by themselves without it. One
+// HeartbeatProducer sends the master's heartbeat, without which drives stop by themselves (1016h). One
 // HeartbeatConsumer per drive watches the drive's heartbeat (1017h).
 #pragma once
 
@@ -15,13 +15,13 @@ namespace proxarm::fieldbus {
 
 inline constexpr std::uint32_t heartbeat_id(std::uint8_t node) noexcept { return 0x700U + node; }
 
-// Sends a heartbeat only if the cycle's counter has moved since the last one. It is called from the cycle: a heartbeat
-// from another thread would go on when the cycle has stopped.
+// Sends a heartbeat only if the cycle's counter has moved. It is called from the cycle: a heartbeat from another thread
+// would go on after the cycle has stopped.
 class HeartbeatProducer {
  public:
   HeartbeatProducer(std::uint8_t node, std::int64_t period_ns) noexcept : node_(node), period_ns_(period_ns) {}
 
-  // True if a heartbeat is due, which is then written to `frame`. `cycle` counts completed cycles.
+  // True if a heartbeat is due and was written to `frame`. `cycle` counts completed cycles.
   [[nodiscard]] bool due(std::int64_t now_ns, std::uint64_t cycle, CanFrame& frame) noexcept;
   void archive(StateArchive& state) noexcept { state(next_ns_, last_cycle_, ever_); }
 

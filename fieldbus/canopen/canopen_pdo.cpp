@@ -52,8 +52,8 @@ std::uint32_t mapping_entry(const MappedObject& mapped) noexcept {
 }
 
 // A fixed mapping of the drive is accepted if it is the wanted one. A transmit PDO may carry further objects at its
-// end, which are ignored. A receive PDO of type 0 (synchronous, acyclic) acts at the same SYNC; one of type 254 or 255
-// (asynchronous) acts on reception.
+// end. A receive PDO of type 0 (synchronous, acyclic) acts at the same SYNC; one of type 254 or 255 (asynchronous) acts
+// on reception.
 std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo) {
   check(pdo);
   const bool receive = pdo.direction == PdoDirection::receive;

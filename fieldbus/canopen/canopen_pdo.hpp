@@ -45,10 +45,10 @@ struct PdoConfiguration {
 [[nodiscard]] bool is_restricted_id(std::uint32_t id) noexcept;
 [[nodiscard]] std::uint32_t mapping_entry(const MappedObject& mapped) noexcept;
 
-// Throws std::invalid_argument if identifier or number are invalid, or the mapping is empty or exceeds 64 bits (CAN FD:
-// 64 bytes). That is a programmer's mistake.
+// Throws std::invalid_argument (a programmer's mistake) for an invalid identifier or number, and for a mapping that is
+// empty or longer than 64 bits (CAN FD: 64 bytes).
 [[nodiscard]] std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo);
-// Disables an unused PDO: a drive's default PDOs would load the bus. Optional: the drive may not have it.
+// Disables an unused PDO, which would load the bus. Optional: the drive may not have it.
 [[nodiscard]] SdoStep disable_pdo_step(PdoDirection direction, std::uint8_t number, std::uint8_t node);
 
 }  // namespace proxarm::fieldbus

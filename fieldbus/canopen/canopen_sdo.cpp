@@ -140,7 +140,7 @@ void SdoClient::poll(std::int64_t now_ns) {
     if (finished()) return;
   }
   if (now_ns < deadline_ns_) return;
-  // The last segment of a block may be lost: an acknowledgement of the received ones makes the server continue.
+  // The last segment of a block may be lost; an acknowledgement of the received ones makes the server continue.
   if (step_ == Step::block_upload_segments && repeats_ < config_.max_block_repeats) {
     ++repeats_;
     acknowledge_block();
@@ -158,7 +158,7 @@ bool SdoClient::on_frame(const CanFrame& frame, std::int64_t now_ns) {
     return true;
   }
   now_ns_ = now_ns;
-  // Segments of a block upload have no command: their first byte is a sequence number. 0 marks an abort (80h).
+  // In a block upload, a segment has no command: its first byte is a sequence number. 0 marks an abort (80h).
   const bool is_segment = step_ == Step::block_upload_segments && frame.data[0] != 0x80;
   if (!is_segment && command_of(frame) == 4) {
     // An abort names the object, or no object at all; an abort of another object is a late answer.

@@ -168,7 +168,7 @@ void SdoSequence::on_value(std::int64_t now_ns) {
   advance(now_ns);
 }
 
-// Accepts the value of an object that couldn't be written, or didn't change, if it is the wanted or a permitted one.
+// Accepts an object that couldn't be written, or didn't change, if it has the wanted or a permitted value.
 void SdoSequence::take_as_found(std::uint32_t value, std::int64_t now_ns) {
   const SdoStep& step = steps_[next_];
   const auto is = [&](std::uint32_t wanted) { return ((value ^ wanted) & step.mask & size_mask(step.bytes)) == 0; };
@@ -210,8 +210,8 @@ std::vector<std::string> SdoSequence::losses() const {
   return all;
 }
 
-// Whether the node refuses a write because of the object or because of the value: many nodes have fewer option codes
-// and narrower ranges than the profile. An optional object then keeps the maker's value, as if it weren't there.
+// Whether a write was refused because of the object or because of the value: many nodes have fewer option codes and
+// narrower ranges than the profile. An optional object then keeps the maker's value.
 SdoSequence::Refused SdoSequence::refused_by(std::uint32_t code) const noexcept {
   constexpr std::uint32_t by_object[] = {sdo_abort::unsupported_access, sdo_abort::write_of_read_only,
                                          sdo_abort::not_transferable, sdo_abort::local_control,

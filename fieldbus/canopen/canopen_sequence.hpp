@@ -1,7 +1,7 @@
 // Configures a node by a table of SDO steps: each is written and read back, or read and compared.
 //
 // Runs on one SdoClient without blocking, so several nodes can be configured side by side. A failure ends the sequence
-// with one SetupProblem that names bus, node, object, found, expected and what to do.
+// with one SetupProblem: bus, node, object, found, expected and what to do.
 #pragma once
 
 #include <cstdint>
@@ -27,15 +27,15 @@ struct SdoStep {
   std::uint32_t mask = 0xFFFFFFFF;  // bits to be compared
   const char* name = "";            // "modes of operation", for the message
   const char* advice = "";          // what the user can do if it differs; "": the default advice
-  // If the node lacks the object or refuses the value, this is noted in missing() or losses() and is no error.
+  // A missing object or refused value is no error; it is noted in missing() or losses().
   bool is_optional = false;
   const char* lost = "";  // what is lost without the object, or with another value; for losses()
   // write: values that may remain if the node refuses the write or keeps its value, compared under `mask`. If empty and
   // the write is refused: any value may remain in an optional object; for others the refusal is an error.
   std::vector<std::uint32_t> as_found{};
   std::int64_t patience_ns = 0;  // expect: read again until it holds, at most for this long
-  // expect: the object shows a state or a value written earlier, so a default in the EDS is only its value at power-up.
-  // false: the object is a constant of the device.
+  // expect: the object is a state, or holds a value written earlier, so its default in the EDS is only the value at
+  // power-up. false: it is a constant of the device.
   bool is_state = false;
 };
 
@@ -78,9 +78,9 @@ class SdoSequence {
   [[nodiscard]] const std::optional<description::SetupProblem>& problem() const noexcept { return problem_; }
   [[nodiscard]] const std::vector<Value>& values() const noexcept { return values_; }
   [[nodiscard]] std::optional<std::uint32_t> value_of(ObjectAddress object) const noexcept;  // last reading
-  // Optional objects that the node lacks, as "1006h:00 communication cycle period".
+  // Missing optional objects: "1006h:00 communication cycle period".
   [[nodiscard]] const std::vector<std::string>& missing() const noexcept { return missing_; }
-  // One line for each loss: objects the node lacks, values it can't take, and objects taken as found.
+  // One line per loss: missing objects, values it can't take, and objects taken as found.
   [[nodiscard]] std::vector<std::string> losses() const;
   // After a problem: the failed step and its abort code (0 if it wasn't aborted).
   [[nodiscard]] const SdoStep& failed_step() const noexcept { return steps_[next_]; }

@@ -1,9 +1,8 @@
 // Lists the CANopen nodes of a bus, for `proxarm scan`.
 //
-// It first listens, since a bus that another controller leads must not be disturbed (bus_leader.hpp). Then it only
-// sends SDO uploads, which change nothing in a node. A sensor is polled only at a base id that the user gives: a
-// guessed identifier can be an NMT command or a setpoint. (For an ATI Net CAN OEM; streaming sensors show among the
-// received identifiers.)
+// It first listens, since a bus led by another controller must not be disturbed (bus_leader.hpp). Then it only sends
+// SDO uploads, which change nothing. An ATI Net CAN OEM is polled only at a base id that the user gives: a guessed
+// identifier can be an NMT command or a setpoint. Streaming sensors show among the received identifiers.
 #pragma once
 
 #include <array>
@@ -54,7 +53,7 @@ struct ScanResult {
 
 // 6502h in words: "CSP, CST"; "none" for 0.
 [[nodiscard]] std::string supported_modes_text(std::uint32_t modes);
-// Meaning of an 11-bit identifier in the predefined connection set: "TPDO1 of node 3".
+// An 11-bit identifier in the predefined connection set: "TPDO1 of node 3".
 [[nodiscard]] std::string connection_text(std::uint32_t id);
 
 }  // namespace proxarm::fieldbus

@@ -79,7 +79,7 @@ bool some_feedback_given_up(Slots drives, const std::vector<SdoSequence>& sequen
   return given_up;
 }
 
-// Runs the same exchange with every drive, side by side. nullopt: feedback was left out, so it must be repeated.
+// One exchange with every drive, side by side. nullopt: feedback was left out, so it must be repeated.
 std::optional<std::vector<DriveIdentity>> try_to_configure(CanNetwork& network, Slots drives,
                                                            const FrameHandler& handler, const StepsOf& steps_of) {
   std::vector<std::uint64_t> boot_ups;

@@ -48,7 +48,7 @@ struct DriveIdentity {
 using Tell = std::function<void(const std::string&)>;
 
 // Frames of other nodes go to `other`. Refuses two drives with the same node on one bus (several of the cell's buses
-// may share an interface). Finally calls each drive's start_cycle().
+// may share an interface). Finally calls start_cycle() of each drive.
 std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, std::span<const DriveSlot> drives,
                                            const FrameHandler& other = {}, const Tell& tell = {});
 

@@ -1,4 +1,4 @@
-// The configuration that a CiA 402 drive gets before the cycle, and descriptions of the drive in words.
+// The configuration of a CiA 402 drive before the cycle, and descriptions of the drive in words.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -80,7 +80,7 @@ void append_identity(std::vector<SdoStep>& steps, const description::DriveDescri
                              mode.unsupported, supported));
 }
 
-// First disable all other PDOs: the bus may only carry what the cycle needs.
+// First disables all other PDOs, to leave the bus to the cycle.
 void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescription& drive, std::uint16_t timeout_ms,
                  std::uint32_t inputs_object, bool torque_feedback) {
   const std::uint8_t node = drive.node;
@@ -95,7 +95,7 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .event_timer_ms = timeout_ms,
                            .fd = drive.fd,
                            .mapping = rpdo_mapping(drive)}));
-  // The last torque acts until this timer runs out; without it, until the heartbeat's timeout. For a drive that doesn't
+  // The last torque acts until this timer runs out, or else until the heartbeat's timeout. For a drive that doesn't
   // watch the heartbeat, the timer is the only stop.
   if (mode_of(drive).torque || drive.bring_up.stops_by == description::StopsBy::setpoint_timer) {
     for (SdoStep& step : steps) {
@@ -131,7 +131,7 @@ void append_torque(std::vector<SdoStep>& steps, const description::DriveDescript
   steps.push_back(if_present(sdo_write({0x6080, 0}, 4, static_cast<std::uint32_t>(std::ceil(rpm)), "max motor speed")));
 }
 
-// Lets the drive watch the controller. Off first: a drive that still watches for the last session's controller would
+// Lets the drive watch the controller. First off, as a drive that still watches for the last session's controller would
 // trip during this set-up.
 void append_heartbeat(std::vector<SdoStep>& steps, std::uint32_t consumer) {
   for (const std::uint32_t value : {0U, consumer}) {
@@ -160,9 +160,8 @@ void append_start_up(std::vector<SdoStep>& steps, const description::BringUp& br
   }
 }
 
-// How the drive reacts when the controller is gone or stops it. 1016h is required, since it stops the arm when the
-// controller dies, unless the cell names another means. The other objects have defaults in the standard that also stop
-// it.
+// Reactions to a lost controller, and to stops. 1016h is required, since it stops the arm when the controller dies,
+// unless the cell names another means. The other objects have defaults in the standard that also stop it.
 void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings,
                       const description::BringUp& bring_up) {
   if (bring_up.stops_by == description::StopsBy::heartbeat) append_heartbeat(steps, settings.consumer_heartbeat());

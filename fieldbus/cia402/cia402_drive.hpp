@@ -1,14 +1,13 @@
-// One CiA 402 servo drive in a cyclic mode (positions or torques): its configuration, its power state machine and its
-// PDOs.
+// One CiA 402 servo drive in a cyclic mode (positions or torques): its configuration, power state machine and PDOs.
 //
 // Wire, every SYNC (identifiers of the predefined connection set): TPDO1 180 + node and RPDO1 200 + node, with contents
 // by mode (cia402_mode.hpp); EMCY 080 + node and heartbeat 700 + node at any time.
 //
 // A cycle: on_sync(); on_frame() for received frames; set_target_rad() if following(); encode_rpdo(), send. These are
-// noexcept and allocate nothing. The target follows the actual position until the drive reports that it follows targets
-// (operation enabled and statusword bit 12: the brake is open). At least three SYNCs must have latched such a target
-// before 0F (enable operation) is sent: otherwise the axis would jump. A torque may be set at any time: the drive
-// applies it once its brake is open, and the axis falls if the torque doesn't hold it.
+// noexcept and allocate nothing. The target follows the actual position until the drive follows targets (operation
+// enabled and statusword bit 12: the brake is open). At least three SYNCs must have latched such a target before 0F
+// (enable operation) is sent: otherwise the axis would jump. A torque may be set at any time: the drive applies it once
+// its brake is open, and the axis falls if the torque doesn't hold it.
 #pragma once
 
 #include <algorithm>
@@ -40,23 +39,23 @@ struct DriveSettings {
   std::uint16_t master_heartbeat_timeout_ms = 60;  // 1016h:01; without the heartbeat the drives stop
   std::uint16_t drive_heartbeat_ms = 50;           // 1017h
   std::uint16_t drive_heartbeat_timeout_ms = 150;  // the master's timeout for drives
-  // false: the drives' heartbeats end with the set-up. A TPDO at every SYNC, which also ends when the drive leaves
-  // operational, shows the same fifty times as often; heartbeats that coincide would delay a full bus's setpoints
-  // beyond their deadline.
+  // false: the drives' heartbeats end with the set-up. A TPDO at every SYNC, which also ends outside of operational,
+  // shows the same fifty times as often, and coinciding heartbeats would delay a full bus's setpoints beyond their
+  // deadline.
   bool heartbeat_in_operation = true;
   std::uint16_t rpdo_timeout_periods = 5;  // 1400h:05, rounded up to whole milliseconds
   // The same in torque mode, rounded down: the last torque acts until then, and the third missed one must be the last.
   std::uint16_t torque_timeout_periods = 3;
   double following_error_window_rad = 0.05;    // 6065h, at the joint
   std::uint16_t following_error_time_ms = 10;  // 6066h
-  // A 32-bit object (index << 8 | sub-index), such as the digital inputs, 60FDh, that this drive sends in TPDO2 at
-  // every SYNC; 0: none. Not decoded here.
+  // A 32-bit object (index << 8 | sub-index) that this drive sends in TPDO2 at every SYNC, such as the digital inputs,
+  // 60FDh; 0: none. Not decoded here.
   std::uint32_t inputs_object = 0;
   SdoSequenceConfig sdo{};
   std::int64_t nmt_timeout_ns = 2'000'000'000;  // for a change of NMT state to show in the heartbeat
 
-  // Makes the drives stop within this time of the controller's last frame, whatever else they watch. The controller's
-  // heartbeat is sent three times as often.
+  // Makes the drives stop within this time of the controller's last frame. The controller's heartbeat is sent three
+  // times as often.
   void stop_without_controller(double within_s) noexcept;
   // 1016h:01, with which a drive watches the controller.
   [[nodiscard]] std::uint32_t consumer_heartbeat() const noexcept {
@@ -88,15 +87,15 @@ class ServoDrive final : public CyclicDrive {
   [[nodiscard]] std::vector<SdoStep> configuration_steps() const;
   // Adds the losses found by configuration_steps(). Not for the cycle.
   void note_losses(const std::vector<std::string>& losses);
-  // Leaves out a transmit PDO's feedback that the drive refused to map, if nothing depends on it; then returns true,
-  // and configuration_steps() no longer has it.
+  // Leaves out optional feedback that the drive refused to map in a transmit PDO; then returns true, and
+  // configuration_steps() no longer has it.
   bool give_up_feedback(const SdoStep& failed, std::uint32_t abort_code);
-  // What the drive lacks and what is lost by that, one line each: by its EDS, and by its answers once it is configured.
+  // What the drive lacks and what is lost by that, one line each: by its EDS and by its answers.
   [[nodiscard]] std::vector<std::string> losses() const;
   // Writes that must wait until the drive is operational.
   [[nodiscard]] std::vector<SdoStep> operation_steps() const;
-  // Steps from one period to another, in the order of writing. The part of 60C2h comes first that makes the period the
-  // longer one until the other part follows. Precondition: 60C2h and 1006h can hold both periods.
+  // Steps from one period to another, in the order of writing. First comes that part of 60C2h which makes the interim
+  // period the longer one. Precondition: 60C2h and 1006h can hold both periods.
   [[nodiscard]] PeriodSteps period_steps(std::int64_t from_ns, std::int64_t to_ns) const noexcept;
   // Identifiers that the master must receive from this node: TPDO1, EMCY, SDO answers, heartbeat.
   [[nodiscard]] std::array<std::uint32_t, 4> wanted_ids() const noexcept;
@@ -110,21 +109,21 @@ class ServoDrive final : public CyclicDrive {
   void start_cycle(std::int64_t now_ns) noexcept;
 
   // ---- cycle ----
-  // A fault that is present when operation is first requested (its last controller died, say) is reset. A later one is
-  // raised as a fault, and only fault_reset leaves it.
+  // Resets a fault that is present when operation is first requested (its last controller died, say). A later fault is
+  // raised, and only fault_reset leaves it.
   void request(DriveGoal goal) noexcept override;
   // Call when a SYNC is sent: frames received before are no longer fresh. Also detects a lost heartbeat.
   void on_sync(std::int64_t now_ns) noexcept override;
   bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;  // true if the frame was this drive's
   // Sets a new target. False if it isn't taken: not following() yet, or fault target_out_of_range.
   bool set_target_rad(double angle_rad) noexcept override;
-  // In torque mode, at the joint. False if the torque is out of range: keeps the old one, fault target_out_of_range.
+  // In torque mode, at the joint. If out of range: false, keeps the old torque, fault target_out_of_range.
   bool set_target_torque_Nm(double torque_Nm) noexcept;
   // The RPDO of this cycle; false until a position is known: then nothing may be sent.
   bool encode_rpdo(CanFrame& frame) noexcept override;
 
-  // Requests the NMT state of a drive that watches the controller by life guarding; send it once per heartbeat period.
-  // False for other drives.
+  // For a drive that watches the controller by life guarding: requests its NMT state, once per heartbeat period.
+  // Others: false.
   [[nodiscard]] bool guard_request(CanFrame& frame) const noexcept;
 
   // ---- the drive's state ----

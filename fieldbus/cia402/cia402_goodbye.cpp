@@ -23,8 +23,8 @@ Watched watched_by(const ServoDrive& drive, std::uint8_t step) noexcept {
 }
 
 constexpr std::int64_t ms = 1'000'000;
-// Most drives need two periods from ready to switch on (no power) to switch on disabled. One that stays in ready to
-// switch on gets its requests after this time.
+// Most drives need two periods from ready to switch on (no power) to switch on disabled. A drive that stays gets its
+// requests after this time.
 constexpr std::int64_t patience_ns = 100 * ms;
 // Drives answer within some milliseconds; a lost frame isn't worth a longer wait.
 constexpr std::int64_t answer_timeout_ns = 50 * ms;

@@ -1,14 +1,14 @@
 // Changes the period of CiA 402 drives while the cycle runs and the drives stand still: 60C2h, 1006h and the receive
 // PDO's timer.
 //
-// Each object is written by an expedited SDO download and read back (CiA 301, 7.2.4.3). At most one request per bus and
-// cycle, so the cycle's own frames are delayed by at most one frame. Optional objects that a drive lacks are left out.
-// The exchange fails if a drive refuses, doesn't answer or keeps another value. take_back() then reads the objects that
-// were written and restores the old period where they differ from it.
+// Each object is written by an expedited SDO download and read back (CiA 301, 7.2.4.3), at most one request per bus and
+// cycle, which delays the cycle's frames by at most one frame. Missing optional objects are left out. The exchange
+// fails if a drive refuses, doesn't answer or keeps another value. take_back() then restores the old period in the
+// objects that were written.
 //
-// 60C2h consists of two objects, value and exponent, so between the two writes the drive has a third period. The order
-// of the writes makes that period the longer one: SYNC then never comes slower than the drive expects, and its
-// supervision doesn't trip. For that, the caller's cycle must run at the shorter of both periods during the exchange.
+// 60C2h consists of two objects, value and exponent, so between the two writes the drive has an interim period. The
+// order of the writes makes it the longer one: SYNC then never comes slower than the drive expects, and its supervision
+// doesn't trip. For that, the cycle must run at the shorter of both periods during the exchange.
 //
 // Construct before the cycle; the functions neither allocate, lock nor throw.
 #pragma once

@@ -72,7 +72,7 @@ class CyclicDrive {
 
   // All state that changes in a cycle.
   virtual void archive(StateArchive& state) noexcept = 0;
-  // Input of the last on_sync() that came by another way than a frame; when read back, the next on_sync() gets it.
+  // Input of the last on_sync() that came without a frame; when read back, the next on_sync() gets it.
   virtual void archive_input(StateArchive& /*state*/) noexcept {}
 
  protected:

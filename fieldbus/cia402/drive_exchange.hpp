@@ -18,7 +18,7 @@ using StepsOf = std::function<std::vector<SdoStep>(const ServoDrive&)>;
 [[nodiscard]] FrameHandler handed_to(std::span<const DriveSlot> drives, const FrameHandler& other = {});
 
 // Runs an exchange with each drive to its end, failed or not; results in the order of the drives. Frames other than SDO
-// answers go to `handler`. `boot_ups`: of each drive at its first answer, as a later restart loses the configuration.
+// answers go to `handler`. `boot_ups` gets each drive's count at its first answer, to detect a later restart.
 [[nodiscard]] std::vector<SdoSequence> exchange(CanNetwork& network, std::span<const DriveSlot> drives,
                                                 const FrameHandler& handler, const StepsOf& steps_of,
                                                 std::vector<std::uint64_t>* boot_ups = nullptr);

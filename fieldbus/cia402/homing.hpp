@@ -17,8 +17,8 @@ namespace proxarm::fieldbus {
 [[nodiscard]] std::int32_t read_position(CanNetwork& network, const DriveSlot& drive, const FrameHandler& other = {});
 
 // Homes the drive and leaves it switched off, with `homed_token` in 1020h:01, which a session requires. `may_move` is
-// called every 10 ms; false stops the motion. Throws SetupError, also with the drive switched off. Precondition: the
-// description has `homing`.
+// called every 10 ms; false stops the motion. Throws SetupError; the drive is then switched off as well. Precondition:
+// the description has `homing`.
 void home(CanNetwork& network, const DriveSlot& drive, const std::function<bool()>& may_move,
           const FrameHandler& other = {});
 

@@ -1,10 +1,10 @@
-// A force/torque sensor known only by its description file (models/description/sensor_protocol.hpp). The file's
-// contents are converted to tables once; the cycle doesn't search or allocate, and accepts any bytes.
+// A force/torque sensor known only by its description file (models/description/sensor_protocol.hpp). The file is
+// converted to tables once; the cycle doesn't search or allocate, and accepts any bytes.
 //
-// A sample is complete when all its frames have come in order, within `together_s` of the first. Its checksum must be
-// right, and its counter must have increased. Parts of two samples are never mixed: for a sensor without counter and
-// checksum, the sample after an incomplete one is dropped too, since its order isn't certain. Frames of a polled sensor
-// must come after the poll, and one sample answers it.
+// A sample is complete when all its frames have come in order, within `together_s` of the first, with a right checksum
+// and an increased counter. Parts of two samples are never mixed: without counter and checksum, the sample after an
+// incomplete one is dropped too, since its order isn't certain. Frames of a polled sensor must come after the poll, and
+// one sample answers it.
 #pragma once
 
 #include <array>

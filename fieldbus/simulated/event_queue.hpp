@@ -1,15 +1,14 @@
 // Discrete events at absolute times; runs the simulated devices and buses.
 //
 // The same queue serves virtual time (SimulatedCanNetwork runs events until the controller's deadline) and real time (a
-// loop sleeps until next_time() and then calls run_until() with the clock's reading). Times are int64 nanoseconds of
-// the owner's clock.
+// loop sleeps until next_time() and then calls run_until()). Times are int64 nanoseconds of the owner's clock.
 //
-// Events run in the order of time; events of equal time run in the order of scheduling. So a run depends on its input
-// alone. An event scheduled for the past runs at once, at now_ns(): time never steps back.
+// Events run in the order of time, then of scheduling, so a run depends on its input alone. An event scheduled for the
+// past runs at once, at now_ns(): time never steps back.
 //
 // A callback is any movable callable of at most `callback_bytes` bytes, called as f() or f(time_ns) with the event's
-// time. It may schedule and cancel events. Its storage is reused: nothing allocates once the number of pending events
-// has reached its peak, or up to the number given to reserve(). Not thread-safe.
+// time. It may schedule and cancel events. Its storage is reused: nothing allocates up to the largest number of pending
+// events so far, or the number given to reserve(). Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -65,8 +64,8 @@ class EventQueue {
   void run_until(std::int64_t time_ns);
   // Runs the next event if its time is at most limit_ns; then now_ns() is its time. False if there is none.
   bool run_next(std::int64_t limit_ns = never);
-  // Advances time without running events. For a real-time loop that is about to handle input of time_ns. Precondition:
-  // next_time() > time_ns. Never steps back.
+  // Advances time without running events, for a real-time loop before it handles input. Never steps back. Precondition:
+  // next_time() > time_ns.
   void advance_to(std::int64_t time_ns) noexcept { now_ns_ = time_ns > now_ns_ ? time_ns : now_ns_; }
 
   [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }

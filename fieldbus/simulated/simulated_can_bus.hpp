@@ -1,12 +1,12 @@
 // One in-process CAN bus with real bit timing and arbitration, on the event queue of its SimulatedCanNetwork.
 //
-// Each port (the controller's, and one per attached node) has a first-in first-out transmit queue, whose head takes
-// part in arbitration. When the bus goes idle, the head with the dominant identifier wins and occupies the bus for its
-// exact length (can_timing.hpp). All other ports receive the frame at the end of its EOF field; the next frame may
-// start three bits later. A frame queued during another one waits for its end.
+// Each port (the controller's, and one per node) has a first-in first-out transmit queue, whose head takes part in
+// arbitration. When the bus goes idle, the head with the dominant identifier wins and occupies the bus for its exact
+// length (can_timing.hpp). All other ports receive the frame at the end of its EOF field; the next frame may start
+// three bits later.
 //
-// A frame isn't delivered if no other node is there to acknowledge it: the controller turns error passive, its queue
-// fills up, and it continues when a node is attached or comes back.
+// A frame that no other node acknowledges isn't delivered: the controller turns error passive, its queue fills up, and
+// it continues when a node is attached or comes back.
 //
 // A frame destroyed by noise (FaultAction::destroy) ends in an error frame and is repeated at once. Every node counts
 // its errors as in ISO 11898-1:

@@ -40,8 +40,8 @@ class SimulatedCanNetwork final : public CanNetwork {
   // Called for every frame of every bus at its end; must not send. Only one observer; an empty function removes it.
   void set_observer(const WireObserver& observer);
   // From now on virtual time never runs ahead of the machine's monotonic clock. If the machine is late by up to
-  // longest_catch_up_ns, virtual time waits and catches up afterwards. A longer gap, such as a suspended process,
-  // passes in virtual time as on a real bus: all nodes keep running, and the sleep ends late.
+  // longest_catch_up_ns, virtual time waits and then catches up. A longer gap, such as a suspended process, passes as
+  // on a real bus: all nodes keep running, and the sleep ends late.
   void follow_real_time();
   static constexpr std::int64_t longest_catch_up_ns = 200'000'000;  // longer than a busy machine delays a process
   static constexpr std::int64_t longest_gap_ns = 1'000'000'000;     // the rest of a longer gap is skipped
