@@ -56,8 +56,8 @@ enum class DeviceFaultKind : std::uint8_t {
   offset,          // "offset": its reported position is AMOUNT rad too large
   stuck,           // "stuck": its reported position doesn't change
   torque_stuck,    // "torque_stuck": its measured gear torque repeats the last reading
-  // Drives in torque mode can't have faults of positions (runaway). Drives on a Modbus line have "silent", "power",
-  // "jammed", the faults of setpoints after it, and these:
+  // A drive in torque mode can't have "runaway". Drives on a Modbus line have "silent", "power", "jammed" to "stuck",
+  // and these:
   modbus_exception,       // "exception": each request is answered by exception VALUE
   modbus_lost,            // "lost": one of VALUE requests gets no answer
   modbus_closed,          // "closed": the connection is closed

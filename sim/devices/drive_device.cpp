@@ -511,7 +511,7 @@ void DriveDevice::on_nmt_state(NmtState from, NmtState to, std::int64_t time_ns)
   if (from == NmtState::initialising && state_ == DriveState::not_ready_to_switch_on) {
     enter(DriveState::switch_on_disabled, 1);
   }
-  // The drive was taken out of operational while it moves: counts as a lost connection.
+  // The drive was taken out of operational while moving: this counts as a lost connection.
   if (from == NmtState::operational) react_to_connection(slave_.dictionary().number(0x6007), emcy::communication);
 }
 

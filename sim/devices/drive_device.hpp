@@ -82,8 +82,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void fix_period_while_enabled(bool fixed) noexcept { period_fixed_ = fixed; }
   // Open: no power, and no command leaves "switch on disabled".
   void open_sto(bool open) noexcept;
-  // Late: 6061h shows the mode only while operation is enabled. never_say_following(): statusword bit 12 stays 0.
-  // show_mode(): 6061h shows `mode` instead of 6060h.
+  // show_mode_late(): 6061h shows the mode only while operation is enabled. never_say_following(): statusword bit 12
+  // stays 0. show_mode(): 6061h shows `mode` instead of 6060h.
   void show_mode_late(bool late) noexcept { shows_mode_late_ = late; }
   void never_say_following(bool on) noexcept { never_following_ = on; }
   // Reports that it follows (bit 12) only while these bits of the controlword are set.

@@ -197,7 +197,7 @@ void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& han
   update_accelerations();
 }
 
-// (d), for one step of δ: with s its sign, z goes exponentially towards s z_m by exp(−|step|/w).
+// (d), for one step of δ: with s its sign, z approaches s z_m by the factor exp(−|step|/w).
 void ArmDynamics::rub(Axis& axis) noexcept {
   const double windup = axis.angle_rad - links_->data->qpos[axis.dof], step = windup - axis.windup_rad;
   axis.windup_rad = windup;

@@ -43,7 +43,7 @@ class ForceSensorModel {
   // Sets the wrench from now until the next call. Precondition: times increase.
   void set_wrench(std::int64_t time_ns, const models::Wrench& wrench_S) noexcept;
   [[nodiscard]] SensorLies& lies() noexcept { return lies_; }
-  // The latest sample at this time. Precondition: time_ns isn't before the last but one set_wrench().
+  // The latest sample at this time. Precondition: time_ns isn't before the second-last set_wrench().
   [[nodiscard]] GaugeSample sample(std::int64_t time_ns) const noexcept;
   // The wrench of that sample before conversion to gauges, noise included: fx fy fz (N), tx ty tz (Nm).
   [[nodiscard]] std::array<double, 6> wrench(std::int64_t time_ns) const noexcept;

@@ -8,8 +8,8 @@
 //
 // Setpoints: a target given at SYNC is reached one interpolation period later, along a straight line from the present
 // setpoint. For the feed-forward, ṙ ramps from the last segment's speed to this one's: a change of speed is one period
-// of constant torque instead of a jerk. Without a new target, the last speed is kept for a quarter of a period (a frame
-// may hold back SYNC), then the setpoint decelerates to rest at the drive's limit.
+// of constant torque instead of an impulse. Without a new target, the last speed is kept for a quarter of a period (a
+// frame may hold back SYNC), then the setpoint decelerates to rest at the drive's limit.
 #pragma once
 
 #include <cstdint>
