@@ -32,7 +32,7 @@ struct DriveSlot {
 struct DriveIdentity {
   std::uint32_t device_type = 0;
   std::uint32_t vendor = 0;
-  std::uint32_t product = 0;  // 0 if the drive doesn't report it; the next three likewise
+  std::uint32_t product = 0;  // 0 if the drive doesn't report it, as in the next three
   std::uint32_t revision = 0;
   std::uint32_t serial = 0;
   std::uint32_t supported_modes = 0;
@@ -41,7 +41,7 @@ struct DriveIdentity {
 
 [[nodiscard]] std::string describe(const DriveIdentity& identity);
 
-// What the drives lack, one line each: "drives of axis_1, axis_2: no 6007h:00: …".
+// Objects that the drives lack and the effects, one line each: "drives of axis_1, axis_2: no 6007h:00: …".
 [[nodiscard]] std::vector<std::string> losses_of(std::span<const DriveSlot> drives);
 
 // Gets a line for each unusual step: "drive of axis_1 (bus can, node 1): started after …".

@@ -90,7 +90,7 @@ class ServoDrive final : public CyclicDrive {
   // Leaves out optional feedback that the drive refused to map in a transmit PDO; then returns true, and
   // configuration_steps() no longer has it.
   bool give_up_feedback(const SdoStep& failed, std::uint32_t abort_code);
-  // What the drive lacks and what is lost by that, one line each: by its EDS and by its answers.
+  // Objects that the drive lacks, by its EDS and by its answers, and the effects; one line each.
   [[nodiscard]] std::vector<std::string> losses() const;
   // Writes that must wait until the drive is operational.
   [[nodiscard]] std::vector<SdoStep> operation_steps() const;

@@ -1,12 +1,12 @@
-// Ends a session: drives that are off are told not to wait for the controller any more, before SYNC and heartbeat end.
-// Otherwise every drive would send an EMCY (8130h: heartbeat lost; 8100h from stacks that watch SYNC in
-// pre-operational, too), and some would stay in fault.
+// Ends a session: before SYNC and heartbeat end, makes drives that are off stop waiting for the controller. Otherwise
+// every drive would send an EMCY (8130h: heartbeat lost; 8100h from stacks that watch SYNC in pre-operational, too),
+// and some would stay in fault.
 //
 //   the caller keeps sending SYNC, controlwords and heartbeat, and asks for next_request() once a period
 //   a drive reports that it is off: 1016h:01 := 0 (no heartbeat is consumed), then 1006h := 0 (no SYNC is expected)
 //   all have answered, or time is up: leave_operational(), which ends the receive PDOs' timers, and silence
 //
-// A drive that isn't off is told nothing: it keeps watching, and stops by itself. Refused and unanswered requests are
+// A drive that isn't off gets no request: it keeps watching, and stops by itself. Refused and unanswered requests are
 // ignored. Construct before the cycle; the functions neither allocate, lock nor throw.
 #pragma once
 

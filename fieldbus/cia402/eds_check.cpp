@@ -94,7 +94,7 @@ void require_found(const EdsFile& eds, const SdoStep& step, std::uint8_t node) {
          expected + ": " + step.name);
 }
 
-// What is lost because an optional object is missing or read-only; empty: nothing.
+// The effect of a missing or read-only optional object; empty: none.
 std::string loss_of(const EdsObject* there, const SdoStep& step, std::uint8_t node) {
   if (*step.lost == '\0') return "";
   if (there == nullptr) return "no " + to_string(step.object) + ": " + step.lost;

@@ -11,9 +11,9 @@
 
 namespace proxarm::fieldbus {
 
-// What the drive lacks according to its file.
+// Objects that the drive lacks by its file.
 struct EdsLosses {
-  std::vector<std::string> missing;  // what is lost by each, one line each
+  std::vector<std::string> missing;  // each with its effect, one line each
   std::string fixed;                 // objects that can't be written, separated by commas
 };
 

@@ -189,7 +189,7 @@ void ModbusDrive::note(ModbusResult result, int exception, std::int64_t now_ns) 
 }
 
 bool ModbusDrive::in_range(std::int32_t counts) const noexcept {
-  constexpr double beyond = 0.05;  // share of the range that a joint may stand beyond it
+  constexpr double beyond = 0.05;  // tolerance, as a share of the range
   const double more = beyond * (high_counts_ - low_counts_);
   return counts >= low_counts_ - more && counts <= high_counts_ + more;
 }

@@ -7,7 +7,8 @@
 //   sensor:frozen@1.5s..1.6s          repeats one sample for a tenth of a second
 //   sensor:status=0x4000@3s
 //   axis_1:holds=0x140002:255         object 1400h:02 is 255
-// DEVICE is a joint's name in the cell, or "sensor". Times count from power on and have a unit.
+// DEVICE is a joint's name in the cell, or "sensor". Times count from power on and have a unit. Permanent faults take
+// no times.
 #pragma once
 
 #include <cstdint>
@@ -22,15 +23,15 @@ enum class DeviceFaultKind : std::uint8_t {
   // Drives
   drive_silent,    // "silent": disconnected from the bus; the firmware runs on
   drive_fault,     // "fault": trips with EMCY code VALUE
-  device_type,     // "device_type": 1000h is VALUE; always, no times
-  object_missing,  // "lacks": object VALUE (index << 8 | sub-index) is missing; always, no times
-  object_fixed,    // "fixed": object VALUE can't be written; always, no times
-  object_holds,    // "holds": object VALUE has CONTENT from power on (OBJECT:CONTENT); always, no times
-  value_refused,   // "refuses": writing object VALUE is aborted with CONTENT (default 0609 0030h); always, no times
-  bits_wanted,     // "wants_bits": reports that it follows only while controlword bits VALUE are set; always, no times
-  mode_first,      // "mode_first": refuses PDO mappings until 6060h has a mode; always, no times
-  mode_late,       // "mode_late": 6061h shows the mode only once operation is enabled; always, no times
-  homed,           // "homed": its incremental encoder was homed before; always, no times
+  device_type,     // "device_type": 1000h is VALUE; permanent
+  object_missing,  // "lacks": object VALUE (index << 8 | sub-index) is missing; permanent
+  object_fixed,    // "fixed": object VALUE can't be written; permanent
+  object_holds,    // "holds": object VALUE has CONTENT from power on (OBJECT:CONTENT); permanent
+  value_refused,   // "refuses": writing object VALUE is aborted with CONTENT (default 0609 0030h); permanent
+  bits_wanted,     // "wants_bits": reports that it follows only while controlword bits VALUE are set; permanent
+  mode_first,      // "mode_first": refuses PDO mappings until 6060h has a mode; permanent
+  mode_late,       // "mode_late": 6061h shows the mode only once operation is enabled; permanent
+  homed,           // "homed": its incremental encoder was homed before; permanent
   heartbeat_lost,  // "heartbeat": sends no heartbeat
   sdo_silent,      // "sdo": doesn't answer SDO requests
   period_fixed,    // "period": refuses to change 60C2h while operation is enabled

@@ -1,7 +1,7 @@
 // A simulated person who pushes the arm as `proxarm prove` asks.
 //
-// `proxarm sim` isn't told what the controller asks a person for, so the helper watches the arm: during a proof, the
-// arm stands longer than elsewhere when it waits for a push. The pushes are along x, y and then x of W
+// `proxarm sim` doesn't know what the controller asks the person to do, so the helper watches the arm: during a proof,
+// the arm stands longer than elsewhere when it waits for a push. The pushes are along x, y and then x of W
 // (controller/proof/proof.hpp, Station). Each time that all drives are enabled and the arm has stood for wait_ns, the
 // helper leans on the handle for lean_ns. A drive that goes off ends this; the next proof begins again. In sessions
 // other than a proof, the pushes come at wrong times.
