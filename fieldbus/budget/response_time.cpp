@@ -25,7 +25,7 @@ struct Competitor {
 };
 
 struct Level {
-  std::uint64_t weakest = 0;  // lowest priority that can precede m; the bus's frames below it are "lower priority"
+  std::uint64_t weakest = 0;  // lowest priority that can precede m; frames below it count as "lower priority"
   std::vector<Competitor> competitors;
 };
 

@@ -28,8 +28,8 @@ bool decode_emcy(const CanFrame& frame, std::int64_t time_ns, std::uint8_t node,
 
 // True if the drive works on: 8120h (its CAN controller counts many errors, but still communicates), 8220h (a PDO was
 // longer than its mapping; its first bytes count), and codes of communication (81xxh) or the maker (FFxxh) with an
-// empty error register. Any other code counts as a fault: CiA 301 and 402 have no warnings, a drive that trips first
-// reports it by EMCY, and some drives don't fill their error register.
+// empty error register. Any other code counts as a fault: CiA 301 and 402 have no warnings, a drive that trips reports
+// that by EMCY first, and some drives don't fill their error register.
 [[nodiscard]] bool is_warning(const Emergency& emergency) noexcept;
 // The wording of CiA 301 (classes) or CiA 402 (drives); the class's wording if the exact code is unknown.
 [[nodiscard]] std::string_view emcy_text(std::uint16_t code) noexcept;
