@@ -49,7 +49,7 @@ struct PlannedFrame {
   std::int64_t every_ns = 0;  // any_time: by the sender's clock, as a streaming sensor does; 0: every_cycles counts
 
   double deadline = 1.0;  // latest end, fraction of the period after the cycle's start (any_time: after queuing)
-  bool sync = false;      // this is the SYNC
+  bool sync = false;
 
   std::vector<CanFrame> typical{};  // examples of its usual data, for the typical load; empty: random data
 };

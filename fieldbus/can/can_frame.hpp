@@ -10,11 +10,11 @@ namespace proxarm::fieldbus {
 // One CAN or CAN FD data frame. `length` counts data bytes: 0..8 classic; FD 0..8, 12, 16, 20, 24, 32, 48, 64. Bytes
 // past `length` are zero and have no meaning.
 struct CanFrame {
-  std::uint32_t id = 0;          // 11 or 29 bits, without flag bits
-  bool extended = false;         // 29-bit identifier
-  bool remote = false;           // remote request (classic only), without data
-  bool error = false;            // reported bus error (SocketCAN error frame); no frame was on the wire
-  bool fd = false;               // CAN FD frame format
+  std::uint32_t id = 0;   // 11 or 29 bits, without flag bits
+  bool extended = false;  // 29-bit identifier
+  bool remote = false;    // remote request (classic only), without data
+  bool error = false;     // reported bus error (SocketCAN error frame); no frame was on the wire
+  bool fd = false;
   bool bit_rate_switch = false;  // FD: data phase at the higher bitrate
   std::uint8_t length = 0;
   std::array<std::uint8_t, 64> data{};

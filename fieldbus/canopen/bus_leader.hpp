@@ -25,7 +25,6 @@ enum class Listening : std::uint8_t {
   for_nodes,   // frames sent by the nodes: PDOs, EMCYs, SDO answers, heartbeats
 };
 
-// A bus to listen on.
 struct BusToLead {
   std::size_t bus = 0;
   std::vector<std::uint8_t> nodes{};  // nodes to be led; empty: only SYNC and NMT are signs

@@ -39,7 +39,6 @@ struct SdoStep {
   bool is_state = false;
 };
 
-// The usual steps, one line each.
 [[nodiscard]] SdoStep sdo_read(ObjectAddress object, std::uint8_t bytes, const char* name);
 [[nodiscard]] SdoStep sdo_expect(ObjectAddress object, std::uint8_t bytes, std::uint32_t value, const char* name,
                                  const char* advice = "", std::uint32_t mask = 0xFFFFFFFF);
@@ -112,7 +111,7 @@ class SdoSequence {
   bool writing_ = false;
   bool answered_ever_ = false;
   int attempt_ = 0;
-  std::int64_t begun_ns_ = 0;  // start of the sequence
+  std::int64_t begun_ns_ = 0;
   std::int64_t step_begun_ns_ = 0;
   std::int64_t again_at_ns_ = -1;  // end of a pause; −1: no pause
   std::vector<Value> values_;

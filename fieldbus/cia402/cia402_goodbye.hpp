@@ -37,7 +37,7 @@ class Goodbye {
   struct Node {
     std::uint8_t step = 0;  // index of the object; their number: finished
     bool waiting = false;
-    std::int64_t deadline_ns = 0;  // for the answer
+    std::int64_t deadline_ns = 0;
   };
 
   [[nodiscard]] bool is_off(const ServoDrive& drive, std::int64_t now_ns) const noexcept;

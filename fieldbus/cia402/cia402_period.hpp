@@ -25,7 +25,6 @@
 
 namespace proxarm::fieldbus {
 
-// Why a drive didn't take the period.
 struct PeriodRefusal {
   std::int32_t drive = -1;  // index of the slot; −1: no refusal
   std::uint16_t index = 0;
@@ -59,8 +58,8 @@ class PeriodExchange {
 
   enum class Waiting : std::uint8_t { nothing, write, read };
   struct Node {
-    bool wanted = false;   // takes part
-    bool touched = false;  // has been written to
+    bool wanted = false;
+    bool touched = false;
     Waiting waiting = Waiting::nothing;
     bool written = false;  // the object of this step has been written
     bool read_next = false;

@@ -26,7 +26,6 @@ enum class DriveState : std::uint8_t {
   unknown,  // not in the standard's table
 };
 
-// The state that the master wants.
 enum class DriveGoal : std::uint8_t {
   none,               // controlword 00 in any state
   operation_enabled,  // faults are not reset

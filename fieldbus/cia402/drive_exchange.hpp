@@ -26,7 +26,6 @@ using StepsOf = std::function<std::vector<SdoStep>(const ServoDrive&)>;
 // Throws SetupError if the command can't be sent.
 void send_nmt(CanNetwork& network, std::span<const DriveSlot> drives, NmtCommand command, const char* name);
 
-// The longest nmt_timeout_ns of these drives.
 [[nodiscard]] std::int64_t longest_nmt_timeout_ns(std::span<const DriveSlot> drives) noexcept;
 
 // True as soon as the heartbeats of all drives show this state; false after `timeout_ns`.

@@ -17,7 +17,6 @@ constexpr std::int64_t signs_of_life_ns = 100'000'000;  // of the controller: fi
 constexpr const char* how_to_start =
     "it took its configuration but doesn't start: look at its display or its error list (1003h)";
 
-// A drive that doesn't start, and its error.
 struct HeldBack {
   DriveSlot slot;
   Emergency error;

@@ -19,8 +19,8 @@
 namespace proxarm::fieldbus {
 
 struct DescribedSensorSettings {
-  std::string bus_name;       // for messages
-  std::uint32_t base_id = 0;  // the cell's base id
+  std::string bus_name;  // for messages
+  std::uint32_t base_id = 0;
   std::int64_t answer_timeout_ns = 100'000'000;
   int attempts = 10;                  // at start, so a booting sensor has a second
   std::int64_t pause_ns = 2'000'000;  // after each command

@@ -26,7 +26,6 @@ using models::Vec3;
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// A sampled state and its result.
 template <int N>
 struct State {
   double K = 0.0;

@@ -66,8 +66,8 @@ enum class CheckVerdict : std::uint8_t { fine, several_solutions, untouched, wro
 struct CheckReport {
   std::string subject;
   std::int64_t states = 0, in_contact = 0, slipping = 0;
-  std::int64_t asked = 0;                                   // states requested; fewer were tried if states < asked
-  double seconds = 0.0;                                     // duration
+  std::int64_t asked = 0;  // states requested; fewer were tried if states < asked
+  double seconds = 0.0;
   bool expects_contact = false;                             // without a contact there is no verdict
   std::int64_t several = 0;                                 // states with several solutions
   std::int64_t ways = 0;                                    // states whose path over a mesh's faces depends on K

@@ -18,7 +18,7 @@ enum class Driven { as_described, left_out };
 
 class Clearances {
  public:
-  // The scene's objects as they are now.
+  // Copies the scene's objects.
   explicit Clearances(const Scene& scene);
 
   // Distance in metres from x_W to the nearest object: negative inside it, infinite in an empty scene. Elastic layers

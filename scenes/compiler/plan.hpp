@@ -43,9 +43,9 @@ struct Plan {
   std::vector<std::int32_t> missed;         // objects that the proxy's space doesn't meet
   // Pairs of flush objects that act as one.
   std::vector<std::pair<std::int32_t, std::int32_t>> joined;
-  std::size_t surfaces = 0;               // of a World or a PlaneComposition
-  std::size_t layers = 0;                 // elastic objects
-  std::size_t moving = 0;                 // objects that move
+  std::size_t surfaces = 0;  // of a World or a PlaneComposition
+  std::size_t layers = 0;
+  std::size_t moving = 0;
   std::optional<GuideDescription> guide;  // in coordinates of the proxy's space
 };
 

@@ -93,7 +93,6 @@ struct ObjectEntry {
   // Called before a write over SDO or PDO takes effect, with the new value (0 for strings and domains). A result other
   // than `none` refuses the write.
   std::function<SdoAbort(std::int64_t)> before_write;
-  // Called after a write took effect.
   std::function<void()> after_write;
 
   // The value as a number, sign-extended for signed types; 0 for strings and domains. Never throws.

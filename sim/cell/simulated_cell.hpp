@@ -56,7 +56,6 @@ struct Truth {
   std::int64_t hand_start_ns = 0;
 };
 
-// The cell's buses, for an in-process network.
 std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell);
 
 class SimulatedCell final : private Clockwork {

@@ -25,10 +25,10 @@ inline constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal
 enum class ModbusFault : std::uint8_t {
   none,
   exception,
-  silent,          // no answer
-  lost,            // one of VALUE requests gets no answer
-  late,            // the answer is VALUE ms late; only on a real line
-  closed,          // the connection is closed
+  silent,
+  lost,  // one of VALUE requests gets no answer
+  late,  // the answer is VALUE ms late; only on a real line
+  closed,
   wrong_unit,      // the next unit's number
   wrong_function,  // another function code
   wrong_count,     // announces one register less

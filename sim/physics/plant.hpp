@@ -93,7 +93,6 @@ class Plant {
   [[nodiscard]] models::Vec3 handle_torque_W() const noexcept { return arm_.handle_torque_W(); }
 
  private:
-  // State of a brake.
   struct Brake {
     std::int64_t delay_ns = 0;      // closing delay
     std::int64_t unpowered_ns = 0;  // time since its servo lost power
@@ -108,7 +107,7 @@ class Plant {
   Hand hand_;
   ForceSensorModel force_sensor_;
   std::vector<ServoLoop> servos_;
-  std::vector<std::optional<GearTorqueSensor>> gear_torques_;  // per axis
+  std::vector<std::optional<GearTorqueSensor>> gear_torques_;
   std::vector<std::int64_t> servo_period_ns_;
   std::vector<Brake> brakes_;
   std::optional<Clamp> clamp_;
