@@ -1,8 +1,8 @@
 // The worker of a Modbus line: exchanges with each of its drives in turn, at the rate they ask for or as fast as the
 // line allows.
 //
-// On a real line, run() has a thread. In simulation, the owner of the virtual clock calls step() at the times that
-// step() returns.
+// On a real line, run() has its own thread. In simulation, the owner of the virtual clock calls step() at the times
+// that step() returns.
 #pragma once
 
 #include <atomic>

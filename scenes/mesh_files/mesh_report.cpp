@@ -104,7 +104,7 @@ bool is_a_body(const LoadedMesh& loaded) {
 
 std::vector<std::string> mesh_surprises(const models::TriangleMesh& mesh, double reach_m, double scale) {
   // A mesh in millimetres is a thousand times too large, and objects that an arm touches have a tenth of its reach to
-  // some times its reach. So 30 times the reach is no object, and neither is a 3000th.
+  // some times its reach. So a mesh of 30 times the reach, or of a 3000th, is in the wrong unit.
   constexpr double too_large = 30.0, too_small = 1.0 / 3000.0;
   // Share of the mesh's diagonal: larger holes are visible, and a sheet's border has about 1.
   constexpr double hardly_seen = 0.1;

@@ -28,7 +28,7 @@ constexpr double rigid_gear_rad_per_s = 2.0 * M_PI * 200.0;
 // Symplectic Euler is unstable from ωh = 2 on; damping and rotors lower that a little.
 constexpr double largest_phase_step = 1.5;
 
-// For step_share() at the start: on the arm's way, masses at its tip change by less than a third.
+// For step_share() at the start: while the arm moves, the masses at its tip change by less than a third.
 constexpr double largest_step_share = 0.75;
 
 Mat3 inertia_matrix(const std::array<double, 6>& i) {

@@ -7,8 +7,8 @@
 //   J_r θ̈ = τ − τ_gear − b θ̇ − τ_friction,   |τ_friction| ≤ F_c                                   (b)
 //   τ_gear = k δ + d δ̇,  δ = θ − φ; with backlash, δ less the dead band, and never against the flank in contact   (c)
 // With ripple, τ is the drive's torque plus A sin(n N θ), with A and n of the cell and N the gear ratio. A gear with
-// hysteresis has a friction z in parallel to its spring (Dahl, "A solid friction model", 1968). After large swings, its
-// loop is as wide at τ_gear = 0 as the cell's hysteresis w:
+// hysteresis has a friction z in parallel to its spring (Dahl, "A solid friction model", 1968). At τ_gear = 0 and after
+// large swings, its loop has the width w, the cell's hysteresis:
 //   τ_gear = k δ + d δ̇ + z,   dz/dδ = (k/2) (1 − sgn(δ̇) z/z_m),   z_m = k w/2                              (d)
 // z is exact if δ is monotonic within a step. A rotor is coupled only to its gear, so Coulomb friction has an exact
 // solution per axis: a stuck, braked or jammed rotor keeps its angle to the bit (a friction constraint in MuJoCo
