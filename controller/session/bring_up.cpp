@@ -167,8 +167,8 @@ double proxy_mass(const description::Cell& cell, const SessionSettings& settings
                     .advice = "ask for more mass, or use a lighter tool"});
 }
 
-// Bounds of the tool's rotation from its orientation at the first start. They are smaller than the cell's limits by a
-// lead, since setpoints must stop before a limit.
+// Returns the bounds of the tool's rotation from its orientation at the first start. The bounds are smaller than the
+// cell's limits by a lead, since setpoints lead the links (turn_sets.hpp).
 TurnSets turn_sets(const description::Cell& cell) {
   const description::CellLimits& limits = cell.limits;
   TurnSets sets;
