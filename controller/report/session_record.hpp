@@ -7,7 +7,7 @@
 //   contacts.csv          a row for each contact of each cycle (signals/contact_columns.hpp)
 //   contacts.bin          the same rows in binary, instead of contacts.csv
 //   contact_columns.json  unit, frame and meaning of each column of contacts.csv or contacts.bin
-//   session.mcap          the same session for other tools (messages/mcap_writer.hpp)
+//   session.mcap          the same session for other tools (view/messages/mcap_writer.hpp)
 //   frames.log            every frame on every bus, in the format of `candump -L`, for canplayer and log2asc
 //   frames.log.zst        the same frames packed, instead of frames.log
 //   effective.yaml        the session's configuration with all defaults; other configuration files have their own names
