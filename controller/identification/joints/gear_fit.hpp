@@ -29,8 +29,8 @@ std::vector<GearLine> gear_lines(const std::vector<MotionRecord>& fast, double l
 
 struct GearFit {
   Gears gears;
-  Eigen::VectorXd stiffness_deviation,
-      damping_deviation;  // standard deviations of ln k, ln d; infinite: not identifiable
+  // Standard deviations of ln k and ln d; infinite: not identifiable.
+  Eigen::VectorXd stiffness_deviation, damping_deviation;
   double delay_s = 0.0, scale = 1.0;
   double left_over_share = 0.0;  // share of the readings' lines that isn't explained, root mean square
 };
