@@ -77,11 +77,10 @@ struct StopFigure {
 struct ClampFigure {
   bool felt = true;
   double stiffness_N_per_m = 0.0;
-  double transient_N = 0.0,
-         quasi_static_N =
-             0.0;         // largest force: transient_N in the first half second of the contact, quasi_static_N after it
-  double energy_J = 0.0;  // largest energy of the spring, k x²/2
-  double left_N = 0.0;    // force at the end of the trial
+  // Largest force: transient_N in the first half second of the contact, quasi_static_N after it.
+  double transient_N = 0.0, quasi_static_N = 0.0;
+  double energy_J = 0.0;    // largest energy of the spring, k x²/2
+  double left_N = 0.0;      // force at the end of the trial
   double at_m_per_s = 0.0;  // the tool's speed at contact
   int pose = 0;             // the pose with the largest transient force
   std::string direction{}, end{};

@@ -181,7 +181,7 @@ class Fit {
     return std::hypot(reading.noise_Nm, by_force_Nm, lever_m * reading.tilt_rad * weight_N());
   }
 
-  // Starts with m and b alone, with equal weights for all readings: F_k − F̄ = m (u_k − ū).
+  // Estimates m and b alone for the start, with equal weights for all readings: F_k − F̄ = m (u_k − ū).
   void start() {
     Vec3 force_mean = Vec3::Zero(), u_mean = Vec3::Zero();
     const double count = static_cast<double>(readings_.size());

@@ -58,9 +58,8 @@ void BusLossSession::run_cycle(std::int64_t t_k_ns) noexcept {
   act(t_k_ns);
   if (step_ == Step::silent) return;
   fieldbus::CanFrame heartbeat;
-  fieldbus::HeartbeatProducer same =
-      parts_.drive_buses.front()
-          .heartbeat;  // heartbeats of all buses start in the same cycle, so one bus shows when they are due
+  // The heartbeats of all buses start in the same cycle, so one bus shows when they are due.
+  fieldbus::HeartbeatProducer same = parts_.drive_buses.front().heartbeat;
   heartbeat_was_last_ = same.due(t_k_ns, cycle_, heartbeat);
   bus_.send_setpoints(setpoints_, t_k_ns, cycle_);
   bus_.hand_over();

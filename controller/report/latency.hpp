@@ -2,9 +2,8 @@
 //
 //   wake_up             from t_k until SYNC is handed to the first interface with drives
 //   compute             the duration of the cycle, without waiting
-//   sensor_to_setpoint  from the sensor's last frame on the wire until the last setpoint is handed to its interface;
-//   only
-//                       for cycles with a new sample of the sensor
+//   sensor_to_setpoint  from the sensor's last frame on the wire until the last setpoint is handed to its interface.
+//                       Only cycles with a new sample of the sensor count
 #pragma once
 
 #include <algorithm>

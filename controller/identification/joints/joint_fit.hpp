@@ -1,13 +1,20 @@
 // Identifies friction, rotor inertia, gear stiffness and gear damping of each joint, with uncertainties, from records
 // of small motions. Masses, gravity and Jacobians come from the arm's library; everything else is computed here.
 //
-// For a joint, with all quantities on the joint's side of the gear. θ is the motor's angle, φ the link's angle (rad;
-// for linear joints m, with N and kg):
+// For each joint, with all quantities on the joint's side of the gear:
 //   τ = J θ̈ + b θ̇ + F sgn(θ̇) + τ_gear                                                      (1)
 //   τ_gear = k (θ − φ) + d (θ̇ − φ̇) = [M(φ) φ̈ + τ_g(φ)]                                     (2)
-//   τ  Nm, motor torque: 6077h times rated_torque_Nm         J  kg m², rotor's inertia at the joint
-//   F  Nm, Coulomb friction    b  Nms/rad, viscous friction  k  Nm/rad, d  Nms/rad, gear
-//   M  kg m², links and tool   τ_g  Nm, gravity
+// Units for a rotating joint; a linear joint has m, N and kg instead of rad, Nm and kg m²:
+//   θ    rad, the motor's angle
+//   φ    rad, the link's angle
+//   τ    Nm, the motor's torque: 6077h times rated_torque_Nm
+//   J    kg m², inertia of the rotor at the joint
+//   b    Nms/rad, viscous friction
+//   F    Nm, Coulomb friction
+//   k    Nm/rad, stiffness of the gear
+//   d    Nms/rad, damping of the gear
+//   M    kg m², inertia of links and tool
+//   τ_g  Nm, gravity's torque
 //
 // The gears are fitted first. θ is measured independently of friction, since the drives control the motors; and the
 // sensor measures how the tool swings (link_response.hpp; fast motions of all joints). The unknowns are ln k, ln d, the
@@ -34,7 +41,7 @@
 
 namespace proxarm::identification {
 
-// Standard deviations of quantities that aren't measured, as shares.
+// Standard deviations of quantities that aren't measured. They are shares, apart from zero_drift_N.
 struct Allowed {
   double link_inertia = 0.025, torque_scale = 0.025, sensor_scale = 0.03;
   // Share of a line's size, for a tilted sensor, changing poses and resolution.
