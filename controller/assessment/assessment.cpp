@@ -85,7 +85,7 @@ class Worst {
 }  // namespace
 
 std::vector<std::vector<double>> poses_about_start(const description::Cell& cell, const models::Arm& arm, int count) {
-  constexpr double reach = 0.4;  // of each joint from its start, in rad or m
+  constexpr double reach = 0.4;  // largest distance of each joint from its start, rad or m
   constexpr double least_share_of_mobility = 0.6;
   constexpr int tries = 1000;
   const models::JointVector& start = arm.start_rad();

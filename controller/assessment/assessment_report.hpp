@@ -10,7 +10,7 @@ namespace proxarm::assessment {
 // What was assessed. These are facts that only the command knows.
 struct Subject {
   std::string cell, hand;                                                      // names
-  double stiffness_N_per_m = 0.0, damping_Ns_per_m = 0.0, hand_mass_kg = 0.0;  // of the hand
+  double stiffness_N_per_m = 0.0, damping_Ns_per_m = 0.0, hand_mass_kg = 0.0;  // the hand's values
   double felt_mass_kg = 0.0, period_s = 0.0, max_tool_speed_m_per_s = 0.0;
   // Number of drives whose cell doesn't describe their brakes.
   int assumed_brakes = 0;

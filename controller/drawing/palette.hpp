@@ -20,7 +20,7 @@ struct Rgb {
 // A named colour as in CSS: #rrggbb, or #rrggbbaa if it is transparent.
 struct Colour {
   const char* name;
-  const char* light;  // for a light background; plots have a white one
+  const char* light;  // colour on a light background, such as that of plots
   const char* dark;
 };
 

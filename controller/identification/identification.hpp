@@ -6,9 +6,8 @@
 //   drift      the cell's sensor.zero_drift_N, from the first pose to the last
 //   gears      a fifth of the difference between a pose's twist and the mean twist, because the stiffness is only known
 //              that well
-//   friction   for joints that move, 2 % of the drive's torque over the gear's stiffness, because of friction in the
-//   gear.
-//              The allowances for gears and friction of all joints are added in squares
+//   friction   for joints that move, 2 % of the drive's torque over the gear's stiffness, because of the gear's
+//              friction. The allowances for gears and friction of all joints are added in squares
 //   sensor     0.1 % of the load (linearity); a resolution of zero_drift_N/1000, by default 1e-5 of the range
 #pragma once
 

@@ -18,7 +18,7 @@ constexpr double spread_over_mounting = 5.0;
 // error of 1e-8.
 constexpr int steps = 6;
 
-// Standard deviation that is expected for c, m: hardly a tool has its centre further away. Without this, c would be
+// Expected standard deviation of c, m: few tools have their centre further away. Without this, c would be
 // unbounded if there is no tool.
 constexpr double far_m = 1.0;
 

@@ -30,14 +30,14 @@ namespace proxarm::identification {
 struct PoseReading {
   models::Mat3 R_SW = models::Mat3::Identity();
   models::Wrench mean_S;
-  double noise_N = 0.0, noise_Nm = 0.0;  // of each axis
+  double noise_N = 0.0, noise_Nm = 0.0;  // standard deviation of the mean on each axis
   double tilt_rad = 0.0;                 // uncertainty of R_SW due to the gears
   double time_s = 0.0;                   // increasing
 };
 
 // Standard deviations of quantities that aren't measured.
 struct Allowances {
-  // Of the sensor about each axis of S, and of the base about each axis of W.
+  // Mounting error of the sensor about each axis of S, and of the base about each axis of W.
   double mounting_rad = 0.0;
   // Drift of the zero on each axis from the first pose to the last. The drift of torques is this times lever_m.
   double zero_drift_N = 0.0;
@@ -64,7 +64,7 @@ struct ToolFit {
   bool mass_found = false, centre_found = false;
   double mass_kg = 0.0, mass_half_kg = 0.0;
   models::Vec3 centre_S_m = models::Vec3::Zero(), centre_half_m = models::Vec3::Zero();
-  models::Wrench zero_S, zero_half_S;  // at the last pose
+  models::Wrench zero_S, zero_half_S;  // the zero at the last pose
   double turned_rad = 0.0;             // |ε| + |δ|, the mounting errors of the fit
   Misfit force, torque;
 };

@@ -27,8 +27,8 @@ struct Expected {
   std::vector<OtherUnit> others;  // other units of the value in the file
 };
 
-// A quantity that is judged instead of the value, because it tells more than the value does. For a stiffness it is the
-// resulting frequency: "with which what is behind it swings at 0.4 Hz".
+// A quantity that is judged instead of the value, because it is easier to judge than the value. For a stiffness it is
+// the resulting frequency: "with which what is behind it swings at 0.4 Hz".
 struct Measure {
   const char* value_unit;  // unit of the value in the file
   double found;

@@ -156,7 +156,7 @@ void BusLossSession::go_to(Step step, std::int64_t t_k_ns) noexcept {
     bus_.request(fieldbus::DriveGoal::none);  // sends no frame; from now on, the drives' reports don't count as faults
   } else if (step == Step::farewell) {
     bus_.request(fieldbus::DriveGoal::none);
-    send_nmt(fieldbus::NmtCommand::start);  // for drives that have left NMT operational
+    send_nmt(fieldbus::NmtCommand::start);  // restarts drives that have left NMT operational
   }
 }
 

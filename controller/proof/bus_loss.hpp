@@ -3,8 +3,7 @@
 //
 //   waiting, enabling, taring   as in any session, under the same supervision
 //   standing                    for 0.3 s, under the same supervision
-//   silent                      for a second: no SYNC, setpoint, heartbeat or SDO; frames are only received. The
-//   silence
+//   silent                      for a second: no SYNC, setpoint, heartbeat or SDO; frames are only received. This step
 //                               begins right after a heartbeat, which is the worst time
 //   farewell                    SYNC, heartbeat and controlwords again, until all drives are off, or for half a second
 //
@@ -92,7 +91,7 @@ class BusLossSession {
   NoListener listener_;
   controller::Setpoints setpoints_;
   std::vector<fieldbus::SilenceWatch> watches_;
-  std::vector<fieldbus::DriveState> last_states_;  // of the drives on CAN, set by ask_the_others()
+  std::vector<fieldbus::DriveState> last_states_;  // states of the drives on CAN, set by ask_the_others()
   Step step_ = Step::waiting;
   std::int64_t since_ns_ = 0, last_word_ns_ = -1;
   bool heartbeat_was_last_ = false;  // whether the last cycle sent a heartbeat

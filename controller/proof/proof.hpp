@@ -34,7 +34,7 @@ struct Station {
 
 struct Reading {
   Station station;
-  models::JointVector motor_rad;  // by the encoders
+  models::JointVector motor_rad;  // the motors' angles by the encoders
   models::Vec3 force_S = models::Vec3::Zero();
   // For estimates of the accuracy of the mean force (controller/identification):
   models::Vec3 torque_S = models::Vec3::Zero();

@@ -125,7 +125,7 @@ void ProofSession::act(std::int64_t t_k_ns) noexcept {
       if (rate_ <= 0.0) supervisor_.handle(Event::at_rest);
       return;
     case Phase::disabling:
-      bus_.request(goal_off());  // a drive may have deviated meanwhile
+      bus_.request(goal_off());  // the goal may have changed, since a drive may have deviated in this phase
       return watch_brakes(in_phase_s);
     default:
       return;

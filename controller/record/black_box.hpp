@@ -150,7 +150,8 @@ class BlackBox final : public CycleBox, public BoxReader {
 
   enum class Memory : std::uint8_t {
     forked,  // for processes forked from this one
-    // Also for any other process that gets descriptor(). This memory counts against a limit of file sizes.
+    // The memory is for any other process, too, that gets descriptor(). This memory counts against a limit of file
+    // sizes.
     by_descriptor,
   };
 

@@ -30,7 +30,7 @@ enum class RecordFlag : std::uint32_t {
   limit_joint = 1u << 5,
   limit_leash = 1u << 6,
   limit_orientation = 1u << 7,
-  hands_off = 1u << 8,  // nobody holds the handle: the proxy comes to rest
+  hands_off = 1u << 8,  // no hand is at the handle: the proxy comes to rest
   truth = 1u << 9,      // the fields of the simulation's true state are filled in
   overrun = 1u << 10,   // the cycle was late; depends on the wall clock, so it is in timing.json, not in signals.csv
   limit_power = 1u << 11,
@@ -160,7 +160,7 @@ struct CycleRecord {
 
   // The simulation's true state at t_k; valid with the flag `truth`.
   Triple true_tool_W_m{};
-  Triple hand_force_W_N{}, hand_torque_W_Nm{};              // of the hand on the tool, about the rendered point
+  Triple hand_force_W_N{}, hand_torque_W_Nm{};              // wrench of the hand on the tool, about the rendered point
   std::array<double, 4> true_tool_q_W{0.0, 0.0, 0.0, 1.0};  // the tool's orientation: x y z w
   Triple true_acceleration_W_m_per_s2{};
 

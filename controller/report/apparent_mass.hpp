@@ -70,7 +70,7 @@ class FeltMassCurve {
  public:
   explicit FeltMassCurve(double period_s);
 
-  // As in ApparentMass.
+  // add() and end_segment() are used as in ApparentMass.
   void add(const models::Vec3& force_N, const models::Vec3& position_m);
   void end_segment();
 
@@ -102,8 +102,8 @@ class FeltMassCurve {
   models::Vec3 last_force_ = models::Vec3::Zero();
   models::Vec3 force_sum_ = models::Vec3::Zero(), acceleration_sum_ = models::Vec3::Zero();
   std::size_t summed_ = 0;
-  std::vector<models::Vec3> force_, acceleration_;  // of the segment that is being filled
-  std::array<std::array<Sums, 3>, bands> sums_{};   // of each band and axis
+  std::vector<models::Vec3> force_, acceleration_;  // samples of the present segment
+  std::array<std::array<Sums, 3>, bands> sums_{};   // sums of each band and axis
   std::size_t segments_ = 0;
 };
 

@@ -26,7 +26,7 @@ struct Oscillation {
   double from_s = 0.0;      // when the spell began, in the record's time
   double duration_s = 0.0;  // 0: no oscillation
   double frequency_Hz = 0.0;
-  double amplitude_m = 0.0;  // of the tool's position
+  double amplitude_m = 0.0;  // amplitude of the tool's position
   // Amplitude of the tool's rotation; absent: the tool doesn't turn.
   std::optional<double> amplitude_rad;
   bool lasts = false;

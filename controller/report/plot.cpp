@@ -36,7 +36,7 @@ void PlotBuilder::place(std::ostream& gp, int row) const {
 
 // Coordinates of the position panels: `directions` from `origin`.
 struct PlotBuilder::Axes {
-  bool wall = false;  // then directions[0] is the normal, directions[1] is along the slide
+  bool wall = false;  // true: directions[0] is the normal, directions[1] is along the slide
   Vec3 origin = Vec3::Zero();
   std::array<Vec3, 3> directions{Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()};
   Vec3 turn = Vec3::UnitZ();  // axis of the shown rotations and torques

@@ -143,9 +143,9 @@ struct SummaryBuilder::State {
   Spread tracking, lagging, contact_force;
   ApparentMass apparent;
   FeltMassCurve felt;
-  ApparentMass apparent_turning;         // for rotation, with angles and torques
+  ApparentMass apparent_turning;         // apparent inertia, from angles and torques
   std::optional<Eigen::Quaterniond> R0;  // orientation at the start of rendering
-  double inertia_kg_m2 = 0.0;            // of the proxy, in the last record
+  double inertia_kg_m2 = 0.0;            // the proxy's inertia in the last record
   OscillationWatch oscillation;
   std::optional<Eigen::Quaterniond> R_k1;  // orientation of the true tool in the last record, if the tool turns
   Vec3 turned_W = Vec3::Zero();            // sum of the true tool's rotations
@@ -155,7 +155,7 @@ struct SummaryBuilder::State {
   std::int64_t period_ns, all_ns = 0, rendered_ns = 0, touching_ns = 0, slipping_ns = 0;
   bool changing = false;  // whether the timestep is changing
   std::int64_t asked_ns = 0;
-  double mass_kg = 0.0;            // of the proxy, in the last record
+  double mass_kg = 0.0;            // the proxy's mass in the last record
   std::optional<Vec3> start;       // x₀ of the virtual spring
   std::deque<CycleRecord> recent;  // consecutive cycles of rendering, newest last
 };
@@ -249,7 +249,7 @@ void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
 }
 
 // Follows changes of the timestep. Nothing is rendered while the timestep changes; figures then go on with the new
-// timestep. The apparent mass is that of the time with the last timestep.
+// timestep. The apparent mass is measured anew after each change.
 void SummaryBuilder::State::follow_timestep(const CycleRecord& record) {
   const bool was_changing = changing;
   changing = record.has(RecordFlag::timestep);

@@ -81,7 +81,7 @@ struct SummaryConfig {
   bool passivity = false;           // whether energies and oscillations are observed
   double lookahead_s = 0.0;         // horizon at the start; not included in setpoint_delay_cycles
   double gear_damping_per_s = 0.0;  // κ of torque-damped gears; 0: no gear is damped
-  std::vector<std::string> axis_names = {};  // for limits of single joints
+  std::vector<std::string> axis_names = {};  // joints' names, for limits of single joints
 };
 
 // The reason for the end of the session: a word for programs, a sentence for people.
@@ -117,7 +117,7 @@ struct NoticeSummary {
 struct ViewSummary {
   std::uint16_t port = 0;
   std::size_t most_viewers = 0;
-  bool may_change = false;  // with --view-control
+  bool may_change = false;  // whether viewers may change the session (--view-control)
 };
 
 // A limit or guard that acted.
@@ -142,7 +142,7 @@ struct LatencySummary {
 
 // A change of the timestep requested during the session.
 struct TimestepSummary {
-  double time_s = 0.0;  // of the request
+  double time_s = 0.0;  // time of the request
   double from_s = 0.0, to_s = 0.0;
   double paused_s = 0.0;  // until rendering went on, or until the change was done in a hold
   std::string refused;    // why the change was refused; empty: it wasn't refused
@@ -181,12 +181,12 @@ struct Summary {
   std::uint64_t overruns = 0;                        // over all phases
   ComputeTimes compute_us;                           // over all phases
   std::map<std::string, LatencySummary> latency_us;  // by the latency's name; set by the caller; empty in virtual time
-  std::optional<PageFaults> page_faults;             // of the cycle's thread; set by the caller; absent in virtual time
-  std::map<std::string, double> bus_load;            // set by the caller
-  bool virtual_time = false;                         // then no cycle can be late; set by the caller
-  std::optional<double> first_cycle_s;               // since power on, in simulation; set by the caller
-  std::optional<double> rendering_from_s;            // since the first cycle
-  std::optional<double> proxy_clearance_min_m;       // distance to the nearest surface; absent: no surface
+  std::optional<PageFaults> page_faults;   // faults of the cycle's thread; set by the caller; absent in virtual time
+  std::map<std::string, double> bus_load;  // set by the caller
+  bool virtual_time = false;               // true: no cycle can be late; set by the caller
+  std::optional<double> first_cycle_s;     // since power on, in simulation; set by the caller
+  std::optional<double> rendering_from_s;  // since the first cycle
+  std::optional<double> proxy_clearance_min_m;  // distance to the nearest surface; absent: no surface
   double penetration_max_m = 0.0;
   double tool_penetration_max_m = 0.0;
   double tool_penetration_touch_max_m = 0.0;
@@ -207,7 +207,7 @@ struct Summary {
   std::map<std::string, LimitSummary> active_limits;  // by the limit's parameter
   std::optional<PassivitySummary> passivity;
   std::optional<Oscillation> oscillation;  // the longest oscillation; absent: not looked for
-  std::optional<Swing> expected_swing;     // of a tool that is led and turned; set by the caller
+  std::optional<Swing> expected_swing;     // swing of a tool that is led and turned; set by the caller
   std::optional<PosesSummary> poses;       // set by the caller; absent: impedance type
   double lookahead_s = 0.0;                // horizon at the start; 0: no lookahead
   double gear_damping_per_s = 0.0;         // κ; 0: no gear is damped

@@ -126,7 +126,7 @@ std::string felt_band(const Summary& s) {
   return "within " + std::string(name) + (band_Hz > 0.0 ? format(" up to %.2g Hz", band_Hz) : " nowhere");
 }
 
-// Tells the frequency up to which the felt mass is right, and the felt mass at the highest frequency.
+// Writes the frequency up to which the felt mass is right, and the felt mass at the highest frequency.
 void tell_felt_mass(const Summary& s, Lines& line) {
   if (s.felt_mass.empty() || !(s.wanted_mass_kg > 0.0)) return;
   std::string bands;
@@ -230,7 +230,8 @@ std::string poses_text(const UnstablePlaces& there) {
 
 namespace {
 
-// Weber fraction of a mass moved by hand: smaller differences are hardly noticed (docs/view.md cites the sources).
+// Weber fraction of a mass moved by hand: hands notice smaller differences only rarely (docs/view.md cites the
+// sources).
 constexpr double noticeable_mass_share = 0.1;
 
 std::string hands_off(const Summary& s) {
@@ -261,7 +262,7 @@ std::string limits_in_brief(const Summary& s) {
   return longest.size() <= most ? text : text + " and " + std::to_string(longest.size() - most) + " more";
 }
 
-// Tells the limits that acted, and the energies.
+// Writes the limits that acted, and the energies.
 void tell_limits(const Summary& s, Lines& line) {
   if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
   for (const auto& [parameter, limit] : s.active_limits) {
@@ -358,7 +359,7 @@ void tell_in_brief(const Summary& s, Lines& line) {
   tell_faults(s, line);
 }
 
-// Tells the place where the felt mass was nearest to the smallest stable mass, if the smallest stable mass was
+// Writes the place where the felt mass was nearest to the smallest stable mass, if the smallest stable mass was
 // searched.
 void tell_margin(const Summary& s, Lines& line) {
   const auto share = [](const PassedPoses::Place& place) {

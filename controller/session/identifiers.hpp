@@ -7,9 +7,9 @@
 
 namespace proxarm::controller {
 
-// Throws SetupError with the cell's file, line and key in two cases: the cell's choices for the sensor are invalid, or
-// the sensor or the enabling input has an identifier that the controller, a drive or the other of the two has on the
-// same bus. `bus_indices` says which of the cell's buses share an interface.
+// Throws SetupError with the cell's file, line and key in two cases. First: the cell's choices for the sensor are
+// invalid. Second: two of sensor, enabling input, controller and drives have the same identifier on one bus, and one of
+// these two is the sensor or the enabling input. `bus_indices` says which of the cell's buses share an interface.
 void require_own_identifiers(const description::Cell& cell, const description::SensorDescription& sensor,
                              const SessionSettings& settings, const BusIndices& bus_indices);
 

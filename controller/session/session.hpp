@@ -17,7 +17,7 @@
 namespace proxarm::controller {
 
 struct SessionHooks {
-  std::function<void(std::int64_t t_k_ns)> before_cycle;  // at t_k, before SYNC: for reading a simulation's true state
+  std::function<void(std::int64_t t_k_ns)> before_cycle;  // called at t_k, before SYNC: for reading a true state
   // Called after the cycle: for draining the records, unless another thread drains them.
   std::function<void()> after_cycle;
 };
@@ -31,7 +31,7 @@ enum class SessionEnd : std::uint8_t {
 };
 
 struct SessionLength {
-  double duration_s;  // of rendering
+  double duration_s;  // time to be rendered
   // The longest release (Phase::freeing), s, once the script has no order left. Only an order or the enabling input
   // ends a release, so without another source of orders the session would never end.
   double longest_release_s = std::numeric_limits<double>::infinity();
@@ -44,7 +44,7 @@ struct SessionTally {
   // suspended).
   std::uint64_t overruns = 0;
   std::uint64_t skipped = 0;  // periods without a cycle
-  PageFaults page_faults;     // of the loop's thread, from the second cycle on
+  PageFaults page_faults;     // page faults of the loop's thread, from the second cycle on
 };
 
 // Runs from the first cycle until the drives are off again. Requests the stop after `length`.

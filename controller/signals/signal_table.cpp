@@ -34,7 +34,8 @@ static_assert(rows_of_block == page_bytes / sizeof(double));
 // Number of rows that are written at once; as many as the buffer of signals.csv holds.
 constexpr std::size_t rows_at_once = 64;
 constexpr std::size_t json_begins_at = 24;
-// Far above the number that is written. Bounds the memory that a damaged head can request.
+// Largest number of rows per block that is read, far above the number that is written. Bounds the memory that a damaged
+// head can request.
 constexpr std::size_t most_block_rows = 1 << 16;
 constexpr std::array<std::pair<Form, const char*>, 5> forms{{{Form::number, "number"},
                                                              {Form::integer, "integer"},

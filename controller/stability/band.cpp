@@ -46,7 +46,7 @@ Vec3 Band::Section::step(const Vec3& in) noexcept {
 
 void Band::design(const BandLimits& limits, double period_s) noexcept {
   const double pi = std::numbers::pi, omega = std::tan(pi * limits.low_Hz * period_s);
-  const std::array angles{pi / 8.0, 3.0 * pi / 8.0};  // of Butterworth's poles
+  const std::array angles{pi / 8.0, 3.0 * pi / 8.0};  // angles of Butterworth's poles
   for (std::size_t i = 0; i < bottom_.size(); ++i) bottom_[i].design(omega, 2.0 * std::cos(angles[i]), -2.0);
   const double corner_Hz = top_Hz(limits.report_rate_Hz, period_s);
   smooths_ = corner_Hz > 0.0;

@@ -156,7 +156,7 @@ class ElasticLoop {
   // For torque-damped gears. of_damped_ has a row of the identity for each such gear, yields_ has a column of κ/k for
   // each. Empty: no gear is damped.
   Eigen::MatrixXd of_damped_, yields_;
-  double torque_ratio_, torque_age_periods_, torque_lag_periods_;  // of torque-damped gears
+  double torque_ratio_, torque_age_periods_, torque_lag_periods_;  // errors and delays of torque-damped gears
 };
 
 }  // namespace proxarm::controller

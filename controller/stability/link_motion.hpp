@@ -27,7 +27,7 @@
 namespace proxarm::controller {
 
 struct LinkMotionConfig {
-  models::JointVector stiffness, damping;  // of each gear, as ElasticArm has them: k > 0, d ≥ 0
+  models::JointVector stiffness, damping;  // k > 0 and d ≥ 0 of each gear, as in ElasticArm
   models::ToolInertia behind_sensor;
   double force_age_s = 0.0;  // τ; below half a period it counts as 0
 };

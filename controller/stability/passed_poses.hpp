@@ -36,7 +36,7 @@ class PassedPoses {
     double time_s = 0.0;
     Felt felt;
     LoopModel loop;
-    models::JointVector joints_rad;  // of the links
+    models::JointVector joints_rad;  // the links' angles
   };
 
   // How far a judged place was from instability.

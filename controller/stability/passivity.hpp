@@ -80,7 +80,7 @@ struct PassivityConfig {
   BandLimits band{.low_Hz = 3.0};
   double average_s = 0.1;
   double share = 0.2;        // least ⟨ẋ̃²⟩/⟨ẋ²⟩ of an oscillation; a deliberate motion at 2 Hz has 0.04
-  double tank_J = 1e-3;      // for a grip of 3000 N/m: the energy of an amplitude of 0.8 mm
+  double tank_J = 1e-3;      // the energy of an amplitude of 0.8 mm in a grip of 3000 N/m
   double refill_W = 0.5e-3;  // a power that is hardly felt, so tolerated: a damping of −40 Ns/m at 0.2 mm and 4 Hz
   double rise_s = 0.05;
   double most_felt_Ns_per_m = 200.0;  // bound of −b̂: B_a grows by at most 4 Ns/m in a millisecond, which isn't felt
@@ -192,7 +192,7 @@ class PassivityObserver {
   double force_square_ = 0.0;                     // ⟨h̃²⟩
   double added_ = 0.0;                            // B_a
   Spell spell_;
-  double remembered_s_ = 0.0;  // for how long another oscillation is damped at once
+  double remembered_s_ = 0.0;  // time for which another oscillation is damped at once
   bool oscillates_ = false;
   PortEnergies energies_;
 };

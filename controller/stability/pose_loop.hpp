@@ -44,8 +44,9 @@ struct PoseLoopModel {
   // How the hand holds the tool. Units of `turning`: Nm/rad, Nms/rad, kg m².
   HandModel place, turning;
   models::Mat6 behind_sensor_W = models::Mat6::Zero();
-  double turning_damping_Nms_per_rad = 0.0, turning_spring_Nm_per_rad = 0.0;  // of the proxy
-  LoopModel loop{};  // all times; the proxy's damping and spring for its position
+  double turning_damping_Nms_per_rad = 0.0,
+         turning_spring_Nm_per_rad = 0.0;  // the proxy's rotational damping and spring
+  LoopModel loop{};                        // all times; the proxy's damping and spring for its position
   std::vector<TouchedPlace> touched{};
 };
 
@@ -78,7 +79,7 @@ class PoseLoop {
   [[nodiscard]] bool stable(const ElasticLoop& loop, const Touch& touch, double mass_kg, double inertia_kg_m2) const;
   [[nodiscard]] ProxyMatrices proxy(const Touch& touch, double mass_kg, double inertia_kg_m2, double margin) const;
 
-  std::vector<ElasticLoop> loops_;  // with drives that lag, and with drives that feed forward
+  std::vector<ElasticLoop> loops_;  // one loop with drives that lag, one with drives that feed forward
   models::Mat6 behind_;
   ProxyMatrices own_;           // the proxy's damping and spring
   std::vector<Touch> touches_;  // the first one is free motion

@@ -5,7 +5,7 @@ import * as THREE from './three/build/three.module.js';
 import { vector } from './connection.js';
 import { colour, onTheme } from './theme.js';
 
-// Classes of the ratio, each up to `below`. Dots are larger where the margin is smaller, so that they can be told apart
+// Classes of the ratio, each up to `below`. Dots are larger where the margin is smaller, so that classes can be distinguished
 // without colours.
 export const CLASSES = [
   { below: 1, colour: '--margin-1', words: 'under 1: may swing', px: 8 },

@@ -29,8 +29,8 @@ class JsonText {
   JsonText& value(const char* text) { return value(std::string_view(text)); }
   JsonText& value(const std::string& text) { return value(std::string_view(text)); }
   JsonText& null() { return literal("null"); }
-  // Adds what another JsonText has written as a value, and clears the other JsonText. Precondition: that is a complete
-  // value.
+  // Adds what another JsonText has written as a value, and clears the other JsonText. Precondition: the other text is a
+  // complete value.
   JsonText& splice(JsonText& whole) { return literal(whole.take()); }
 
   template <typename Value>
