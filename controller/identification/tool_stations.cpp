@@ -91,7 +91,8 @@ std::vector<JointVector> best_of(const description::Cell& cell, const models::Ar
   for (const JointVector& pose : poses) shown.push_back(down_in_sensor(cell, arm, pose));
   std::vector<JointVector> taken{start};
   std::vector<Vec3> directions{down_in_sensor(cell, arm, start)};
-  // If the directions span fewer than three dimensions, this makes the determinant that of the spanned dimensions.
+  // Added to the scatter's diagonal. If the directions span fewer than three dimensions, determinants are then compared
+  // over the spanned dimensions alone.
   constexpr double little = 1e-4;
   for (std::size_t n = 0; n < chosen; ++n) {
     double most = 0.0;

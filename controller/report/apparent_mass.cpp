@@ -162,7 +162,8 @@ void FeltMassCurve::end_segment() {
   summed_ = 0;
 }
 
-// The second difference is the acceleration at the last sample. So the last sample's force is added with it.
+// The second difference of three positions is the acceleration at the middle position, so it is added with the force of
+// the middle sample.
 void FeltMassCurve::add(const Vec3& force_N, const Vec3& position_m) {
   if (last_positions_.size() == 2) {
     const Vec3 a = (position_m - 2.0 * last_positions_[1] + last_positions_[0]) / (period_s_ * period_s_);

@@ -144,7 +144,7 @@ struct LatencySummary {
 struct TimestepSummary {
   double time_s = 0.0;  // time of the request
   double from_s = 0.0, to_s = 0.0;
-  double paused_s = 0.0;  // until rendering went on, or until the change was done in a hold
+  double paused_s = 0.0;  // from the request until rendering went on, or until a change in a hold was done
   std::string refused;    // why the change was refused; empty: it wasn't refused
 };
 

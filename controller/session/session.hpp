@@ -17,7 +17,7 @@
 namespace proxarm::controller {
 
 struct SessionHooks {
-  std::function<void(std::int64_t t_k_ns)> before_cycle;  // called at t_k, before SYNC: for reading a true state
+  std::function<void(std::int64_t t_k_ns)> before_cycle;  // at t_k, before SYNC; may read the simulation's state
   // Called after the cycle: for draining the records, unless another thread drains them.
   std::function<void()> after_cycle;
 };

@@ -5,8 +5,8 @@ import * as THREE from './three/build/three.module.js';
 import { vector } from './connection.js';
 import { colour, onTheme } from './theme.js';
 
-// Classes of the ratio, each up to `below`. Dots are larger where the margin is smaller, so that classes can be distinguished
-// without colours.
+// Classes of the ratio, each up to `below`. Dots are larger where the margin is smaller, so that classes differ without
+// colours, too.
 export const CLASSES = [
   { below: 1, colour: '--margin-1', words: 'under 1: may swing', px: 8 },
   { below: 1.5, colour: '--margin-2', words: '1 to 1.5', px: 6 },

@@ -20,7 +20,7 @@ struct PresentSettings {
   std::vector<models::Vec3> position_m;  // wanted displacement of each driven object
   double handle_mass_kg = 0.0;
 
-  // Takes the settings with which the session began.
+  // Begins with the settings of the session's beginning, which `stage` has.
   explicit PresentSettings(const Stage& stage);
 
   // Applies `change` as the cycle did at this timestep. Returns whether a setting now has another value.
