@@ -8,7 +8,8 @@
 // sensor turns F_S. A wrong sign or scale of the sensor multiplies F_S. Each of these mistakes is a hypothesis with two
 // figures, where the model is the right side above, with the mistake:
 //   ρ = √(Σ|F_S(k) − F̄_S − (model − its mean)|² / Σ|model − its mean|²)   over the readings without a push
-//   α = the largest angle between a measured push (reading with the push minus reading without it) and R_SW d
+//   α = the largest angle between a measured push (reading with the push minus reading without it) and the model's
+//       p R_SW d
 // The proof succeeds if the cell as it is explains the readings (ρ and α are within their bounds) and no single mistake
 // explains them about as well. Otherwise the mistakes that explain the readings are listed, the best explanation first.
 //

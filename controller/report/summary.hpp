@@ -93,7 +93,7 @@ struct EndSummary {
 // An order or a change ("set mass=6") of the script that wasn't carried out.
 struct OrderSummary {
   std::string order;
-  double time_s = 0.0;  // since the first cycle; for a change: time of rendering
+  double time_s = 0.0;  // after the first cycle; of a change: rendered time before it
   std::string refused;  // the reason why it wasn't carried out
 };
 

@@ -77,7 +77,7 @@ class Stage {
   StageOptions options_;
   models::Arm arm_;
   models::LinkTree tree_;
-  scenes::CompiledScene compiled_;  // only for changes to the scene's objects
+  scenes::CompiledScene compiled_;  // needed only by changes_, which refers to it
   controller::SceneChanges changes_;
   std::unique_ptr<models::PoseAlgorithm> rigid_;  // computes distances of a tool with a shape; null: a point tool
 };
