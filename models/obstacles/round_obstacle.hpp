@@ -2,7 +2,7 @@
 // points at distance R ≥ 0 from a core. The core is a point, a segment or a line.
 //
 // The step is derived as follows:
-// 1. The normal N at r lies along the line from the core through r.
+// 1. The surface normal at r lies along the line from the core through r. N Nᵀ projects onto the tangent plane at r.
 // 2. In units where K = 1, friction is −λ N Nᵀ (r − q) with an unknown λ ≥ 0. So the tangential balance is
 //      N Nᵀ [(r − p) + λ (r − q)] = (1 + λ) N Nᵀ (r − p') = 0   with p' = (p + λ q)/(1 + λ).
 // 3. So r is the surface point nearest to p', whereas without friction r is the surface point nearest to p.
