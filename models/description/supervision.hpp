@@ -12,8 +12,7 @@
 //     max_force_step_N: 60             # largest change of the force of hand and handle between two samples
 //     reactions: {sensor_lost: hold}   # of faults for which a reaction can be chosen: reaction_choices()
 //
-//     monitored_standstill: false      # if true, a joint that moves while the arm must stand is the fault
-//     standstill_left
+//     monitored_standstill: false      # if true, motion of a joint while the arm must stand is a fault
 //
 //   enabling_input: {drive: axis_3, bit: 16}                                  # bit of 60FDh, the digital inputs
 //   enabling_input: {bus: sensor, identifier: 0x1A0, byte: 0, bit: 0}         # bit of a CAN message
