@@ -1,7 +1,7 @@
 // Reads numbers with units from the command line: 1ms, 0.5 ms, 3kg, 20Ns/m.
 //
-// The unit is required if a number alone would be ambiguous, such as a duration's. All functions throw SetupError
-// naming `option`, the text that the user typed, such as "--timestep".
+// A unit is required where a number alone would be ambiguous, as for a duration. All functions throw SetupError. The
+// error names `option`, which is the option that the user typed, such as "--timestep".
 #pragma once
 
 #include <string_view>
