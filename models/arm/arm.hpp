@@ -105,13 +105,13 @@ class Arm {
   // Returns (nᵀ J M⁻¹ Jᵀ n)⁻¹ in kg; infinite if T can't move along the unit vector n.
   [[nodiscard]] double effective_mass(const JointVector& q, const Vec3& n_W) const noexcept;
   // Returns the range of effective_mass() over all directions. `dimensions`: 2 if the tool moves in a plane, 1 if it
-  // moves on a line; the directions are then those in this plane or line.
+  // moves on a line; only directions in this plane or line then count.
   [[nodiscard]] TipMass effective_mass_range(const JointVector& q, int dimensions = 3) const noexcept;
 
   // Returns the motor angles at rest, which the encoders show because they are on the motors. Gravity twists gear i by
   // τ_i/k_i, so
   //   q_motor = q + τ_g(q)/k   (as angles at the joint; k = 0 means a rigid gear)
-  // The second function adds the torques of a wrench on the tool, as holding_torque() does.
+  // The second function uses holding_torque() instead of τ_g, and so includes a wrench on the tool.
   [[nodiscard]] JointVector motor_from_link(const JointVector& q) const noexcept;
   [[nodiscard]] JointVector motor_from_link(const JointVector& q, const Wrench& wrench_W) const noexcept;
   // Returns the motor angles at which the links start to move with this acceleration: q + (M_link q̈ + τ_g)/k, where
@@ -134,7 +134,7 @@ class Arm {
   struct Link {
     Pose fixed = Pose::Identity();
     double mass_kg = 0.0;
-    Vec3 centre_of_mass = Vec3::Zero();  // in the link's frame
+    Vec3 centre_of_mass = Vec3::Zero();  // in the link's frame, m
     Mat3 inertia = Mat3::Zero();         // about the centre of mass, in the axes of the link
     int drive = 0;                       // index in the cell's drives
     bool slides = false;                 // true: prismatic along z, q in m; false: revolute about z

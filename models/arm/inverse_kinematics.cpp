@@ -248,8 +248,9 @@ JointVector InverseKinematics::towards_posture(const JointVector& q) const noexc
   return -config_.posture_share * g;
 }
 
-// Takes damped steps within ±box of q0. Each step uses the least damping with which it stays there and brings the tool
-// nearer by at least a quarter of the distance that J predicts. If a step gains less, J is too far from linear for it.
+// Takes damped steps within ±box of q0. Each step uses the least damping with which the step stays within this box, and
+// brings the tool nearer to the target by at least a quarter of the distance that J predicts. If the tool gets less
+// near, the kinematics are too nonlinear for this step.
 template <int Axes>
 void InverseKinematics::damped(const Angles<Axes>& q0, const Angles<Axes>& box, int iterations, const Pose& X_WT,
                                InverseKinematicsResult& result) const noexcept {
@@ -273,8 +274,8 @@ void InverseKinematics::damped(const Angles<Axes>& q0, const Angles<Axes>& box, 
     const Angles<Axes> q_before = result.q;
     const double before = e.norm();
     constexpr double quarter = 0.25;
-    // Values of σ below 1e-8 σ_max are rounding errors of J Jᵀ. The values tried for λ go from there to far above
-    // σ_max, where steps are tiny.
+    // Values of σ below 1e-8 σ_max are rounding errors of J Jᵀ. The values tried for λ begin at 1e-8 σ_max and end far
+    // above σ_max, where steps are tiny.
     double lambda2 = 1e-16 * squares[5];
     bool nearer = false;
     for (int rung = 0; rung < 24 && !nearer; ++rung, lambda2 *= 8.0) {

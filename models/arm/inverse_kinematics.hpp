@@ -22,7 +22,7 @@
 //                 g = −posture_share [(q − q_posture) + p(q)]
 //               p is 0 in the middle 70 % of a joint's range. From there it grows quadratically to the whole range at
 //               the ends of the range. So the tool's path determines the elbow's path; if the tool returns, the elbow
-//               does.
+//               returns too.
 // Turning the tool back, and motion in the null space, take at most a tenth of each joint's step limit, in the first
 // step of a call.
 #pragma once
@@ -46,7 +46,7 @@ struct InverseKinematicsConfig {
   // If the target is missed and the smallest singular value is below this, the miss counts as singular. At this value,
   // a joint turns at 1 rad/s for 10 mm/s at the tool.
   double singular_m_per_rad = 0.01;
-  int max_iterations = 8;  // of Newton's method
+  int max_iterations = 8;  // most iterations of Newton's method
   int max_damped_iterations = 4;
   // The fraction per call. At 1 kHz, the elbow follows in half a second.
   double posture_share = 0.002;
@@ -59,8 +59,8 @@ struct InverseKinematicsResult {
     converged,      // residuals are within tolerance, and joints within the step limit
     limited,        // the step limit stopped the joints before the target; the next call continues
     singular,       // the joints stopped before the target, near a singularity
-    not_converged,  // the target is out of reach from here, or reachable only by a longer path
-    invalid,        // the angles or the target aren't finite, or the target isn't a pose: q is the input
+    not_converged,  // from the present angles, the target is out of reach, or reachable only by a longer path
+    invalid,        // the angles or the target aren't finite, or the target isn't a pose; result.q is then the given q
   };
 
   Status status = Status::invalid;
@@ -69,11 +69,11 @@ struct InverseKinematicsResult {
   JointVector q;              // rad
   double position_residual_m = 0.0;
   double rotation_residual_rad = 0.0;
-  ToolKinematics kinematics;  // at q
-  // The next two fields are set by measure_singularity(), and by solve() if the target is missed.
-  // Smallest singular value of the weighted J near q. It is an estimate, within 10 % if the value is small.
+  ToolKinematics kinematics;  // the kinematics at q
+  // Smallest singular value of the weighted J near q: an estimate, within 10 % if the value is small. Set by
+  // measure_singularity(), and by solve() if the target is missed.
   double smallest_singular_value_m_per_rad = 0.0;
-  // Unit vector of the weighted motion (v, length·ω) in which J is smallest.
+  // Unit vector of the weighted motion (v, length·ω) in which J is smallest. Set together with the singular value.
   Vec<6> lost_direction_W = Vec<6>::Zero();
 };
 
@@ -138,8 +138,8 @@ class InverseKinematics {
 
   const Arm& arm_;
   InverseKinematicsConfig config_;
-  Vec6 max_step_;               // for six axes
-  JointVector other_max_step_;  // for other numbers of axes
+  Vec6 max_step_;               // step limits for six axes
+  JointVector other_max_step_;  // step limits for other numbers of axes
   ToolSpace space_;
   Mat3 projection_;  // projection onto space_
   int lost_row_;     // index of the task's smallest singular value among all singular values in ascending order

@@ -57,7 +57,7 @@ struct ModbusLineDescription {
 
 // Properties of a joint's drive that only a simulation uses.
 struct SimulatedDrive {
-  double coulomb_friction_Nm = 0.0;  // at the joint, on the motor side of the gear
+  double coulomb_friction_Nm = 0.0;  // torque at the joint, from friction on the motor side of the gear
   double viscous_friction_Nms_per_rad = 0.0;
   double gear_damping_Nms_per_rad = 0.0;  // damping of the elastic gear
   // The real stiffness over gear_stiffness_Nm_per_rad. It differs from 1 because data sheets aren't exact.
@@ -74,9 +74,9 @@ struct SimulatedDrive {
   double gear_torque_ratio = 1.0, gear_torque_offset_Nm = 0.0, gear_torque_noise_Nm = 0.0;
   double gear_torque_hysteresis_Nm = 0.0;
   double brake_torque_Nm = 0.0;        // torque with which the closed brake holds or slows the joint; 0: unlimited
-  double brake_delay_s = 0.0;          // from the loss of power until the brake is closed
-  double position_gain_per_s = 0.0;    // of the outer loop of the cascade
-  double velocity_bandwidth_Hz = 0.0;  // of the inner loop of the cascade
+  double brake_delay_s = 0.0;          // time from the loss of power until the brake is closed
+  double position_gain_per_s = 0.0;    // gain of the outer loop of the cascade
+  double velocity_bandwidth_Hz = 0.0;  // bandwidth of the inner loop of the cascade
   double velocity_feedforward = 1.0;   // factor of the interpolated setpoint's velocity
   double acceleration_feedforward = 1.0;
   double servo_rate_Hz = 4000.0;
@@ -156,8 +156,9 @@ struct BringUp {
   // Longest time from the request for operation until the drive follows targets; none: the session's value, 5 s.
   std::optional<double> enable_timeout_s;
   // The other fields are for cia402 only:
-  double start_timeout_s = 2.0;   // until the drive's first answer, and until the drive shows a change of its NMT state
-  double answer_timeout_s = 0.2;  // for each SDO request; a request is sent three times
+  double start_timeout_s =
+      2.0;  // time until the drive's first answer, and until the drive shows a change of its NMT state
+  double answer_timeout_s = 0.2;  // time for each SDO request; a request is sent three times
   // Whether 6061h shows the mode only after operation is enabled.
   bool shows_mode_enabled = false;
   StopsBy stops_by = StopsBy::heartbeat;
@@ -198,19 +199,19 @@ struct DriveDescription {
   double max_acceleration_rad_per_s2 = 0.0;
   // The torque at the joint for 1000 in 6071h and 6077h: 6076h times the gear ratio. 0: not stated.
   double rated_torque_Nm = 0.0;
-  // At the joint. In mode cst, the largest torque that may be requested. In other modes, the drive's largest torque,
-  // which limits the setpoints. 0: not stated.
+  // Torque at the joint. In mode cst, it is the largest torque that may be requested. In other modes, it is the drive's
+  // largest torque, which limits the setpoints. 0: not stated.
   double max_torque_Nm = 0.0;
   BringUp bring_up;
   // modbus: whether a test has shown that the file's word_order is the order of this drive.
   bool word_order_tried = false;
-  std::optional<HomingDescription> homing;  // for an incremental encoder; none: the encoder is absolute
+  std::optional<HomingDescription> homing;  // only for an incremental encoder; none: the encoder is absolute
   double rotor_inertia_kg_m2 = 0.0;         // at the joint
   // Bandwidth of the drive's position loop, from its maker or from a test. The stability check assumes this lag.
   double position_bandwidth_Hz = 100.0;
   // 0: the gear is taken as rigid. Used to compensate for the deflection by gravity.
   double gear_stiffness_Nm_per_rad = 0.0;
-  std::optional<double> gear_damping_Nms_per_rad;  // for the stability check; none: unknown
+  std::optional<double> gear_damping_Nms_per_rad;  // only used by the stability check; none: unknown
   SimulatedDrive simulation;
 
   [[nodiscard]] double counts_per_rad() const noexcept;  // has the sign of `direction`
@@ -242,8 +243,8 @@ struct SensorPlacement {
   double noise_N = 0.0;       // only for a simulated sensor: standard deviation per axis
   double noise_Nm = 0.0;
   // Only the stability check uses the next three fields.
-  double sample_rate_Hz = 0.0;  // of the sensor's converter; it isn't synchronised with the cycle
-  double bandwidth_Hz = 0.0;    // of the sensor's low-pass filter; 0: no filter
+  double sample_rate_Hz = 0.0;  // rate of the sensor's converter, which isn't synchronised with the cycle
+  double bandwidth_Hz = 0.0;    // bandwidth of the sensor's low-pass filter; 0: no filter
   double delay_s = 0.0;         // additional age of the sensor's readings
   // Largest difference between the sensor's zero at the tare and its known zero; 0: zero_drift_N(sensor).
   double zero_drift_N = 0.0;
@@ -263,10 +264,11 @@ struct BoxDescription {
 
 struct CellLimits {
   double max_tool_speed_m_per_s = 0.5;
-  // For all joints from the third on, the wrist included (the elbow). By default this is max_tool_speed_m_per_s.
+  // Limit for the speed of the elbow: of all joints from the third on, the wrist included. The default is
+  // max_tool_speed_m_per_s.
   double max_elbow_speed_m_per_s = 0.5;
   double max_tool_acceleration_m_per_s2 = 20.0;
-  double max_turning_speed_rad_per_s = 2.0;  // of the tool, if the hand may turn the tool
+  double max_turning_speed_rad_per_s = 2.0;  // turning speed of the tool, if the hand may turn the tool
   double max_turn_rad = 0.7;                 // angle of the tool from its orientation at the start; 0 to 3
   // max_tilt_rad: angle of an axis of the tool from its direction at the start. max_twist_rad: turn about this axis.
   // Both 0 to 3.
@@ -275,7 +277,7 @@ struct CellLimits {
   double max_force_N = 200.0;                      // a higher reading is a fault
   double max_power_W = 80.0;                       // power between arm and hand, in either direction; 0: no limit
   double leash_m = 0.02;                           // longest distance from the measured tool to the proxy
-  // Of a drive at rest. If a drive's error is larger, setpoints wait for the drive.
+  // Largest following error of a drive at rest. If a drive's following error is larger, setpoints wait for the drive.
   double following_error_rad = 1e-3;
   std::array<double, 3> workspace_min_m{-std::numeric_limits<double>::infinity(),
                                         -std::numeric_limits<double>::infinity(),
@@ -284,7 +286,8 @@ struct CellLimits {
                                         std::numeric_limits<double>::infinity(),
                                         std::numeric_limits<double>::infinity()};
   std::vector<BoxDescription> keep_out;  // boxes that the rendered point may not enter
-  double setpoint_bandwidth_Hz = 25.0;   // of the filter that prevents elastic gears from ringing; 0: no filter
+  double setpoint_bandwidth_Hz =
+      25.0;  // bandwidth of the filter that prevents elastic gears from ringing; 0: no filter
 
   bool operator==(const CellLimits&) const = default;
 };
@@ -316,7 +319,7 @@ struct Cell {
   double default_mass_kg = 4.0, default_damping_Ns_per_m = 0.0;
   // Absolute path; may be empty. In the cell's file, the path is relative to the file's folder.
   std::string default_scene;
-  std::string default_hand;  // the same as for default_scene
+  std::string default_hand;  // as default_scene: absolute path; may be empty
 
   bool operator==(const Cell&) const = default;
 };

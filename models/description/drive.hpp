@@ -9,7 +9,7 @@
 namespace proxarm::description {
 
 // Returns the entries of `drives` in order. `drive_defaults` supplies the keys that an entry doesn't have, and
-// `simulation_defaults` the keys that the entry's `simulation` doesn't have. Throws SetupError.
+// `simulation_defaults` supplies the keys that the entry's `simulation` doesn't have. Throws SetupError.
 std::vector<YamlNode> drive_nodes(const YamlNode& root);
 
 // Returns the error with the drive's name added, if it is an error in a default value. A default value that is wrong

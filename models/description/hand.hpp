@@ -65,13 +65,14 @@ struct HandDescription {
   double stiffness_N_per_m = 500.0;
   double damping_Ns_per_m = 20.0;
   double max_force_N = std::numeric_limits<double>::infinity();  // largest force of the grip
-  // For rotation about the tool's point. If all values are 0, the hand doesn't twist the handle.
+  // The hand's properties for rotation about the tool's point. If all of these are 0, the hand doesn't twist the
+  // handle.
   double inertia_kg_m2 = 0.0;  // inertia without the handle's, equal about each axis; the sensor feels it
   double turning_stiffness_Nm_per_rad = 0.0;
   double turning_damping_Nms_per_rad = 0.0;
   double max_torque_Nm = std::numeric_limits<double>::infinity();
   std::vector<Grip> grips;  // the grips that follow the grip above
-  GripVariation variation;  // of all grips, including the grip on the orientation
+  GripVariation variation;  // variation of all grips, including the grip on the orientation
   std::vector<Waypoint> waypoints;
   std::vector<Sine> multisine;
   std::vector<TimedVector> trajectory;            // replaces waypoints; m, in W, relative to the trajectory's first row

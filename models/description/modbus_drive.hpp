@@ -53,7 +53,7 @@ struct ModbusDriveDescription {
   bool high_word_first = true;  // word order of values in two registers
   bool function_23 = true;
   double rate_Hz = 100.0;            // exchanges per second on the line, if the line can carry them
-  double response_timeout_s = 0.02;  // for one exchange
+  double response_timeout_s = 0.02;  // longest time of one exchange
   double stale_after_s = 0.1;        // after this time without an answer, the drive counts as lost
   std::uint16_t command_register = 0;
   std::vector<ModbusValue> command;

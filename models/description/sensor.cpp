@@ -72,7 +72,7 @@ SensorSimulation read_simulation(const YamlNode& node) {
   return s;
 }
 
-constexpr double drifting_share = 0.01;  // as a fraction of the range
+constexpr double drifting_share = 0.01;  // fraction of the range
 
 }  // namespace
 

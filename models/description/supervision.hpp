@@ -52,13 +52,13 @@ struct SupervisionDescription {
   LetGo let_go = LetGo::rest;
   double empty_handle_N = 0.1;    // if the force is below this for half a second, nobody holds the handle
   double max_bias_drift_N = 0.5;  // largest drift of the sensor's bias while nobody holds the handle
-  // Largest change of the force of hand and handle between two samples (controller/handle/force_jump.hpp).
+  // Largest change of the force of hand and handle between two successive samples (controller/handle/force_jump.hpp).
   double max_force_step_N = 60.0;
   bool monitored_standstill = false;
   // Time in which each drive on CAN stops by itself when the controller is gone.
   double bus_loss_stop_s = 0.06;
   std::string brake_release;                     // how a person can open the brakes by hand; empty: not possible
-  std::map<std::string, std::string> reactions;  // from a fault's name to one of the fault's reaction_choices()
+  std::map<std::string, std::string> reactions;  // key: a fault's name; value: one of the fault's reaction_choices()
 
   bool operator==(const SupervisionDescription&) const = default;
 };

@@ -50,7 +50,8 @@ std::string unit_of_key(std::string_view key);
 
 class YamlNode {
  public:
-  // Reads a file. Messages name the file as `file` does. Relative paths in the file are resolved against its folder.
+  // Reads a file. Messages contain `file` as it is given here. Relative paths in the file are resolved against its
+  // folder.
   static YamlNode load(const std::filesystem::path& file);
   // Reads text in memory. `file` is used in messages and for relative paths.
   static YamlNode parse(std::string_view text, const std::filesystem::path& file);
@@ -106,7 +107,7 @@ class YamlNode {
   // Returns a path as path_of() does, and checks that it is a readable file.
   [[nodiscard]] std::filesystem::path existing_file(std::string_view key) const;
 
-  // From now on, the map `defaults` supplies the keys that this map doesn't have. If an entry is a map in both, its
+  // Makes the map `defaults` supply the keys that this map doesn't have. If an entry is a map in both maps, the entry's
   // keys are supplied one by one. Errors name the place where the value is written. A key that is asked of this map
   // counts as known in `defaults`, too. Does nothing unless this node is a map. Precondition: `defaults` is in the same
   // file.

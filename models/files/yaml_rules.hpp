@@ -1,5 +1,5 @@
-// Checks rules that are more than a single number's range. They are functions, so that a journal (yaml_journal.hpp) can
-// record them. All throw SetupError, as YamlNode's functions do.
+// Checks rules that are more than a single number's range. Each rule is a function, so that a journal
+// (yaml_journal.hpp) can record the rule. All functions throw SetupError, as YamlNode's functions do.
 #pragma once
 
 #include <cstdint>

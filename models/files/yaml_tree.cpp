@@ -27,11 +27,11 @@ constexpr std::size_t max_bytes = 16U << 20U;
 constexpr auto patience_with_pipes = std::chrono::seconds(2);  // longest total time for reading a pipe
 constexpr std::size_t max_depth = 32;
 constexpr std::size_t max_key_bytes = 100;
-// Most keys in one map. Files have some dozens. More keys would be slow, because the look-up takes time linear in their
-// number.
+// Largest number of keys in one map. Files have some dozens. More keys would be slow, because the time of a look-up is
+// proportional to the number of keys.
 constexpr std::size_t max_keys = 1000;
 
-// In a file. A tree of this many values takes about 100 MB.
+// Largest number of values in one file. A tree of this many values takes about 100 MB.
 constexpr std::size_t max_values = 500'000;
 
 // yaml-cpp accepts the end of the file as the end of an unclosed quote. This extra last line makes an unclosed quote

@@ -39,7 +39,7 @@ struct Contact {
 // The time of a step, which a 𝒢 may use besides K, p and q. Only moving objects and laws that contain time need it.
 struct StepTime {
   double time_s = 0.0;     // the time of q(k), which is the end of the step
-  double period_s = 1e-3;  // T; 2T/3 at order 2
+  double period_s = 1e-3;  // the period T of the step; at order 2 it is 2T/3
 };
 
 // A geometric algorithm in N dimensions. Calls don't allocate, lock or throw. An instance may remember where the proxy

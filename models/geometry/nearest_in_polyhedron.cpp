@@ -13,7 +13,8 @@ constexpr double dependent = 1e-10;
 constexpr double rounding = 1e-14;
 // Tolerance of a row in the solution, relative to the row's bound. Nearly parallel active rows leave no more digits.
 constexpr double held = 1e-6;
-// Most exchanges of rows. About three are usual. The method is finite without rounding, but rounding can make it cycle.
+// Largest number of exchanges of rows. About three are usual. Without rounding the method always ends; with rounding it
+// can cycle.
 constexpr int most_exchanges = 100;
 
 }  // namespace

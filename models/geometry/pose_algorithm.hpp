@@ -4,8 +4,8 @@
 //
 // K is symmetric and positive definite, 6 × 6 (N/m, N, Nm/rad), at the tool's reference point. w is the wrench (force,
 // and torque about the reference point, in W) that the world exerts on the tool. With (26) on SE(3), K is diag(M, J)/T²
-// + B/T + K_v, and p̂ is the pose that the tool would reach without the world. The law of a step is the one of Moreau
-// and Jean, with positions instead of velocities:
+// + B/T + K_v, and p̂ is the pose that the tool would reach without the world. A step obeys the law of Moreau and Jean,
+// with positions instead of velocities:
 //
 //   w = Σ (f_i, (x_i − x) × f_i)        over the contacts at points x_i; x is the reference point
 //   gap_i ≥ 0, n_iᵀ f_i ≥ 0, n_iᵀ f_i gap_i = 0

@@ -18,7 +18,7 @@ using Quaternion = Eigen::Quaterniond;
 using Twist = Vec<6>;  // translation (m), then rotation (rad); as a wrench: force (N), then torque (Nm)
 
 struct ToolPose {
-  Vec3 position = Vec3::Zero();                     // of the reference point
+  Vec3 position = Vec3::Zero();                     // position of the reference point
   Quaternion orientation = Quaternion::Identity();  // unit quaternion, from T to W
 
   // Transforms a point of the tool from T to W.

@@ -155,7 +155,7 @@ void TriangleMesh::weld(TriangleSoup& soup) {
   }
 }
 
-// The root is alone in its pair. Places the other box of the pair where no query finds it.
+// The root is alone in its pair. Places the pair's unused box where no query finds it.
 void TriangleMesh::empty_second_root() {
   constexpr float nowhere = std::numeric_limits<float>::infinity();
   for (auto& axis : structure_.nodes[0].box) {

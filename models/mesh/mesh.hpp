@@ -187,13 +187,13 @@ class TriangleMesh {
     }
   }
 
-  // Returns the distance from x to the nearest face, or `most` if no face is nearer than `most`. `near` is the face
-  // that is tested first; any face will do. `near` becomes the nearest face.
+  // Returns the distance from x to the nearest face, or `most` if no face is nearer than `most`. Before the call,
+  // `near` is the face to test first, which may be any face. After the call, `near` is the nearest face.
   [[nodiscard]] double distance(const Vec3& x, double most, std::uint32_t& near) const noexcept {
     return distance_at_least(x, most, near, 1.0);
   }
-  // Returns a lower bound of distance(), at least `share` of it, and tests far fewer faces than distance() does. `near`
-  // becomes a face near x.
+  // Returns a lower bound of distance(), at least `share` of it, and tests far fewer faces than distance() does. After
+  // the call, `near` is a face near x.
   [[nodiscard]] double distance_at_least(const Vec3& x, double most, std::uint32_t& near, double share) const noexcept;
 
   // Whether x is inside a closed mesh.

@@ -155,8 +155,8 @@ class FacePairs {
   }
 
   // Precondition: the edge of g opposite the corner `off` lies in the plane of f. Returns the place where the surface
-  // of g continues beyond this edge on the other side of f. If the edge lies on an edge of f, "the other side" is that
-  // of the two faces beside this edge of f.
+  // of g continues beyond this edge on the other side of f. If the edge of g lies on an edge of f, the two faces beside
+  // this edge of f replace f.
   [[nodiscard]] Place passed(std::uint32_t f, std::uint32_t g, std::size_t off) const noexcept {
     const std::size_t k = (off + 1) % 3;
     const Vec3 &from = mesh_.corner(g, k), &to = mesh_.corner(g, (k + 1) % 3);

@@ -105,7 +105,8 @@ struct Cell {
 //    along a side of one triangle leaves the other triangle, or a corner of one triangle within the other triangle. So
 //    v or w may be chosen for the fan.
 // 3. If two triangles share three corners, they are the same face twice; twins() visits them.
-// 4. Faces that are within near_m of one another's plane are projected onto this plane, and steps 1 to 3 hold there.
+// 4. Faces that are within near_m of one another's plane are projected onto this plane, and steps 1 to 3 hold for the
+//    projections.
 //
 // Therefore a cell is extended by 2 near_m on all sides: by near_m for the distance in step 4, and by near_m for
 // rounding. (Rounding is a few u times the largest coordinate S, and near_m is at least lift_m(), which is 64 u S.)
@@ -177,8 +178,8 @@ class CellSearch {
     return std::all_of(parts.begin(), parts.end(), [&](const Part& child) { return search(child, left); });
   }
 
-  // Tests the pairs whose intervals overlap. In such a pair, the interval with the higher low begins within the other
-  // interval.
+  // Tests the pairs whose intervals overlap. If two intervals overlap, the interval with the higher low begins within
+  // the interval with the lower low.
   [[nodiscard]] bool look_at(const Part& part) const {
     const auto look = [this](const Shadow& of, auto first, auto last) {
       return std::all_of(first, last, [&](const Shadow& other) { return meeting(of.face, other.face); });

@@ -23,7 +23,7 @@ bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) noexcept;
 // Whether the closed segment from x to y has a point in common with the closed triangle. Precondition: a, b and c
 // aren't collinear.
 bool segment_touches_triangle(const Vec3& x, const Vec3& y, const Vec3& a, const Vec3& b, const Vec3& c) noexcept;
-// As above, but with the sides of x and y, orientation(a, b, c, ·), already known.
+// Does the same test if the sides of x and y, orientation(a, b, c, ·), are already known.
 bool segment_touches_triangle(const Vec3& x, const Vec3& y, int side_x, int side_y, const Vec3& a, const Vec3& b,
                               const Vec3& c) noexcept;
 

@@ -116,8 +116,9 @@ class MeshSurface final : public GeometricAlgorithm<3> {
     std::uint32_t face = 0;
     int side = 0;  // 1: front, −1: back, 0: no face
     FlatSurface<3> surface = FlatSurface<3>::of_unit(Vec3::Zero(), Vec3::UnitZ());
-    std::array<Vec3, 3> out;    // for each side of the triangle: the normal out of the triangle, in its plane, unit
-    std::array<double, 3> rim;  // for each side of the triangle: outᵀ corner
+    std::array<Vec3, 3> out;  // for each side of the triangle: the unit vector in its plane that is normal to the side
+                              // and points outwards
+    std::array<double, 3> rim;  // for each side of the triangle: outᵀ corner, for a corner on this side
   };
   Held held_;
 

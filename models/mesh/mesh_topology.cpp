@@ -87,7 +87,8 @@ Vec3 middle(const TriangleMesh& mesh, std::uint32_t f) {
   return (mesh.corner(f, 0) + mesh.corner(f, 1) + mesh.corner(f, 2)) / 3.0;
 }
 
-// Calls visit(first, last) for each edge; first and last limit the range of its entries, one per face.
+// Calls visit(first, last) for each edge of the mesh. [first, last) are the entries of this edge in `edges`, one entry
+// per face.
 template <typename Visit>
 void each_edge(const std::vector<Edge>& edges, Visit visit) {
   for (auto first = edges.begin(); first != edges.end();) {
@@ -103,8 +104,8 @@ void note(MeshDefect& defect, const Vec3& at_W) {
 }
 
 struct Outlines {
-  std::vector<std::vector<std::uint32_t>> loops;   // the first vertex follows the last
-  std::vector<std::vector<std::uint32_t>> chains;  // from the first vertex to the last
+  std::vector<std::vector<std::uint32_t>> loops;   // closed: an edge connects the last vertex to the first vertex
+  std::vector<std::vector<std::uint32_t>> chains;  // open: the edges run from the first vertex to the last
 };
 
 // Returns the outlines of the edges that have one face. An outline runs against the direction of this face, as the

@@ -377,7 +377,7 @@ bool MeshSurface::Walk::can_support(std::size_t contacts, const std::array<std::
 
 // Ends a step in which no set of faces lets the proxy move: the proxy stays where it is, for example at a vertex.
 void MeshSurface::Walk::hold() noexcept {
-  // Only leave_planes() moves the proxy by so little.
+  // A move of at most kAround · lift comes only from leave_planes(). It is undone.
   if (c != q && (c - q).norm() <= kAround * lift) c = q;
   report_holding();
   for (std::size_t k = 0; k < s.count_; ++k) s.contacts_[k].reached = c != q;

@@ -14,14 +14,14 @@ struct MeshSurface::Walk {
   // A touched face, with the normal on the proxy's side.
   struct Side {
     std::uint32_t face;
-    // The side on which the proxy is: 1: in front, −1: behind, 0: exactly in the triangle's plane (only for a caller's
-    // q).
+    // 1 if the proxy is in front of the face, −1 if it is behind, 0 if it is exactly in the triangle's plane (only
+    // possible for a caller's q).
     int side;
-    Vec3 point, normal;  // of the touched surface, which is one lift in front of the face
+    Vec3 point, normal;  // point and normal of the touched surface, which is one lift in front of the face
     [[nodiscard]] FlatSurface<3> surface() const noexcept { return FlatSurface<3>::of_unit(point, normal); }
   };
-  // Most faces that are considered together. A regular mesh has six faces around a vertex. Of more than 64 faces, the
-  // faces with the least indices are considered; the proxy may then stick at a vertex where it could slide.
+  // Largest number of faces that are considered together. A regular mesh has six faces around a vertex. Of more than 64
+  // faces, the faces with the least indices are considered; the proxy may then stick at a vertex where it could slide.
   static constexpr std::size_t kMost = 64;
   // For up to this many touched faces, all pairs and triples are tried. For more faces, only pairs that share a side
   // are tried, because the number of triples grows with the cube of the number of faces.
@@ -69,8 +69,8 @@ struct MeshSurface::Walk {
   const Vec3 p, q;
   Vec3 c;                   // the present position of the proxy in the walk
   Vec3 p_at;                // p, or a point on the path to p if p is too far for exact tests
-  std::uint32_t came_from;  // the face that the last move left over a side
-  int budget;               // the cost that the step may still have, see kBudget
+  std::uint32_t came_from;  // the face that the last move left over one of its sides; kNone: no such face
+  int budget;               // the cost that the step may still spend, see kBudget
   std::size_t count = 0;
   std::array<Side, kMost> touched;
 };

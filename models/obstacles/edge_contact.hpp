@@ -1,7 +1,7 @@
-// Solves the contact at a convex edge or corner of a solid if friction holds the proxy there.
+// Solves the contact of a proxy that friction holds at a convex edge or corner of a solid.
 //
-// A face exerts no force beyond its edge. If the proxy comes from beside an edge, the step on each face's plane may
-// end beyond the edge, although p is inside the solid. Then the edge itself holds the proxy:
+// A face exerts no force beyond its edge. If the proxy comes from beside an edge, the step on each face's plane may end
+// beyond the edge, although p is inside the solid. Then the edge itself holds the proxy:
 // 1. The normal is between the normals of the faces: n(θ) = cos θ n₁ + sin θ n₂.
 // 2. For the right θ, the step by (17) on the plane through the edge with normal n(θ) ends on the edge.
 // 3. From θ = 0 to 90°, the end of this step moves from one side of the edge to the opposite side, so such a θ exists.

@@ -32,8 +32,8 @@ class MovingObstacle final : public Obstacle {
     go_from(now_);
   }
 
-  // Sets the pose at the end of the next step. In this step the object moves there from the pose of the last call. Call
-  // it once before each step. A rotation that isn't orthonormal within rounding is orthonormalised.
+  // Sets the object's pose at the end of the next step. In this step the object moves from the pose of the last call to
+  // this pose. Call it once before each step. A rotation that isn't orthonormal within rounding is orthonormalised.
   void drive(const Pose& X) noexcept {
     driven_from_ = now_;
     now_ = orthonormalised(X);
@@ -53,7 +53,7 @@ class MovingObstacle final : public Obstacle {
   [[nodiscard]] std::size_t contacts(double K, const Vec3& p, const Vec3& q, const Step& s,
                                      std::array<Contact<3>, 3>& out) const noexcept override;
 
-  // Precondition: q is already carried along by the object's motion; World does that.
+  // Precondition: q is already carried along by the object's motion; World calls carry() for this.
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     return still_->excludes(now_inverse_ * q, now_inverse_ * r);
   }

@@ -14,7 +14,7 @@ namespace proxarm::models {
 // GB/s.
 [[nodiscard]] std::string packed(std::string_view bytes);
 
-// Unpacks a frame of `bytes` bytes. Returns nullopt if the frame is damaged or contains another number of bytes.
+// Unpacks a frame of `bytes` bytes. Returns nullopt if the frame is damaged or doesn't contain `bytes` bytes.
 // Precondition: the caller limits `bytes`, because this much memory is allocated.
 [[nodiscard]] std::optional<std::string> unpacked(std::string_view frame, std::size_t bytes);
 

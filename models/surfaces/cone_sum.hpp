@@ -43,8 +43,8 @@ inline bool in_all_caps(const Vec3& y, std::span<const ForceCone> cones, std::si
 
 }  // namespace detail
 
-// Whether f is within tolerance_N of C. Meant for a handful of cones, because the time grows with the cube of their
-// number. Precondition: the axes have unit length, and μ ≥ 0.
+// Whether f is within tolerance_N of C. Use it for a few cones only, because the time grows with the cube of the number
+// of cones. Precondition: the axes have unit length, and μ ≥ 0.
 inline bool in_sum_of_cones(const Vec3& f, std::span<const ForceCone> cones, double tolerance_N) noexcept {
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   const double size = f.norm();

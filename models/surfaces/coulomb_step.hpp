@@ -78,9 +78,9 @@ class CoulombStep {
     return F_ * places / (r - q_).norm() + kappa_ * (places + 16.0 * u * p_.template lpNorm<1>());
   }
 
-  // Tries (3), second case: the proxy ends without contact. Attempt 0 tries the exact end of the motion. The other
-  // attempts try ends some units in the last place beside it, because for a p beyond the middle of a ball 𝒢' may find
-  // one point free and its neighbour blocked.
+  // Tries (3), second case: the proxy ends without contact. Attempt 0 uses the exact end point of the motion. Attempts
+  // 1 to 8 use points some units in the last place beside the end point. They are necessary if p is beyond the middle
+  // of a ball: 𝒢' may then find a point blocked although the neighbouring point is free.
   bool goes_free(int first, int last, Vec<N>& r) noexcept {
     const double share = (kappa_ * size_ - F_) / (kappa_ * size_);  // fraction of the path from q to p; NaN for p = q
     if (!(share > 0.0)) return false;
@@ -94,8 +94,8 @@ class CoulombStep {
     return false;
   }
 
-  // Whether the rest of the world leaves a proxy that is at q there, within the rounding of q. The stiffness is huge,
-  // so that elastic layers don't move the proxy.
+  // Whether a proxy at q stays at q in the rest of the world, within the rounding of q. The stiffness is huge, so that
+  // elastic layers don't move the proxy.
   bool q_is_place() noexcept {
     return (rest_(1e15 * kappa_, q_, q_) - q_).norm() <= 32.0 * u * q_.template lpNorm<1>();
   }
@@ -105,7 +105,7 @@ class CoulombStep {
   // rounding of r. `high` becomes the last sample. Returns true if the world is flat from the first sample on.
   bool extrapolate(Vec<N>& R, Sample& high) noexcept {
     constexpr int most = 14;
-    // By degree: values at 1 − τ = 0 of the polynomials through the last samples.
+    // row[d] is the value at 1 − τ = 0 of the polynomial of degree d through the last samples.
     std::array<Vec<N>, most> row;
     row[0] = R;
     Sample sample = high;

@@ -178,7 +178,7 @@ class Groove {
   // Whether a contact sticks while the other contact slips. This is possible for a contact with w = 0, because it
   // needn't slip across the line. If the function returns true, either the solution was accepted, or no solution exists
   // because a contact pulls. If it returns false, lo and hi have been narrowed to the side of s_i to which contact i is
-  // pushed; the root is there.
+  // pushed, because the root is on this side.
   bool one_sticks(const CrossSection& c, double& lo, double& hi) noexcept {
     for (int i = 0; i < 2; ++i) {
       if (c.w[i] != 0.0 || !(c.mu[i] > 0.0) || c.s_q[i] < lo || c.s_q[i] > hi) continue;

@@ -1,7 +1,7 @@
 // Renders a world of one or two dimensions with a 𝒢 of three dimensions; the added coordinates stay zero.
 //
-// Precondition: all surface normals of the 𝒢 of three dimensions lie in the first N dimensions, so that all its forces
-// lie there too.
+// Precondition: all surface normals of the 𝒢 of three dimensions lie in the first N dimensions. Then all its forces lie
+// in these dimensions, too.
 #pragma once
 
 #include <array>

@@ -30,8 +30,8 @@ struct MembershipError {
 
 // Tolerances of the conditions "q is on the surface" and "q moves along the surface".
 struct MembershipTolerance {
-  double surface_m = 1e-12;     // q counts as on the surface up to this height
-  double motion_m_per_s = 0.0;  // the proxy counts as resting up to this ‖Nᵀv‖
+  double surface_m = 1e-12;     // q counts as on the surface if its height is at most this
+  double motion_m_per_s = 0.0;  // the proxy counts as resting if ‖Nᵀv‖ is at most this
 };
 
 // Law (14): o if nᵀq > 0;  {f n | f > 0} if nᵀq = 0. Here the set is closed (f ≥ 0): contact without force is a member.

@@ -4,8 +4,8 @@
 // A viscous medium with damping b (Ns/m) adds −(b/T)(r − q) to ℳ. Let 𝒢' be the rest of the world and f' its force:
 //   f'(r) = K (r − p) + (b/T)(r − q) = (K + b/T)(r − p'),   p' = (K p + (b/T) q)/(K + b/T).
 // So the medium acts as a stiffer coupling to a point p' that is nearer to q than p is: 𝒢(K, p, q) = 𝒢'(K + b/T, p',
-// q). In free space q(k) = p'. coulomb_step.hpp solves a step in a Coulomb medium. In a step, those media act that
-// contain q. T is the step's period; at order 2 it is 2T/3 of the session's T. Precondition: set_time() is called
+// q). In free space q(k) = p'. coulomb_step.hpp solves a step in a Coulomb medium. A medium acts in a step if it
+// contains q. T is the period in StepTime (at order 2 two thirds of the cycle). Precondition: set_time() is called
 // before each step.
 #pragma once
 

@@ -68,7 +68,7 @@ class FlatSupport {
   // Returns the residual (m) at which forces count as settled: the rounding of r.
   [[nodiscard]] double rounding_m() const noexcept { return 64.0 * u * size_; }
 
-  // Returns the sum of the sizes of all forces over K, m.
+  // Returns the sum of ‖f_i‖/K over all contacts, m.
   [[nodiscard]] double squeeze_m() const noexcept {
     double sum = 0.0;
     for (std::size_t i = 0; i < count; ++i) sum += x[i].norm();

@@ -71,7 +71,7 @@ SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, con
   return out;
 }
 
-// Up to three planes that hold a point r: the point nearest to p on the free side of these planes.
+// Up to three planes that hold a point r. r is the point nearest to p on the free side of these planes.
 class HoldingPlanes {
  public:
   // Adds one more plane and drops planes that no longer hold r. Returns false if it finds no point.
@@ -285,8 +285,8 @@ void World::choose(double K, const Vec3& p, const Vec3& q) noexcept {
   std::sort(pressed_.begin(), pressed_.end(), [](const Pressed& a, const Pressed& b) { return a.index < b.index; });
 }
 
-// Whether the proxy gets from q to r around an obstacle that blocks the straight path. It goes over the edge where the
-// obstacle releases it. All other obstacles must let it pass there, too.
+// Whether the proxy gets from q to r around an obstacle that blocks the straight path. The proxy goes over the edge of
+// the obstacle. All other obstacles must allow a proxy at this edge, too.
 bool World::gets_around(const Obstacle& obstacle, const Vec3& p, const Vec3& q, const Vec3& r) const noexcept {
   const Vec3 edge = obstacle.detour(p, q);
   if (edge == q || obstacle.excludes(edge, r)) return false;
@@ -497,8 +497,8 @@ bool World::is_free(const Vec3& q, const Vec3& r) const noexcept {
   });
 }
 
-// Ends a step for which no set is complete. The proxy stays at q if all obstacles allow it there. Otherwise it takes
-// the step of the single obstacle whose step ends nearest to p.
+// Ends a step for which no set is complete. The proxy stays at q if all obstacles allow a proxy at q. Otherwise it
+// takes the step of the single obstacle whose step ends nearest to p.
 void World::stay(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept {
   const bool allowed = is_free(q, q);
   for (std::size_t c = 0; c < candidates.count; ++c) {
@@ -522,7 +522,8 @@ double World::distance(const Vec3& x) const noexcept {
   return tree_.nearest(x, least, [&](std::size_t i) { return entries_[i].obstacle->distance(x); });
 }
 
-// Finds the end of the step and its contacts. Returns false if no set of contacts was complete.
+// Finds the point at which the step ends, and the contacts at this point. Returns false if no set of contacts was
+// complete.
 bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexcept {
   Candidates& candidates = candidates_;
   candidates.clear();

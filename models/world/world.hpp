@@ -134,7 +134,7 @@ class World final : public GeometricAlgorithm<3> {
   std::array<Contact<3>, 3> contacts_{};
   std::array<Contact<3>, Candidates::most> shared_{};  // used instead of contacts_ if elastic layers share the force
   bool are_shared_ = false;
-  std::vector<Pressed> pressed_;         // the obstacles that press in this step; reserved for all obstacles
+  std::vector<Pressed> pressed_;         // the obstacles that press in this step; memory is reserved for all obstacles
   std::array<std::size_t, 3> likely_{};  // obstacles of a crowd that would hold the proxy without friction
   std::size_t likely_count_ = 0;
   int attempts_left_ = 0;   // pairs and triples that this step may still try
