@@ -65,9 +65,8 @@ class Arm {
   [[nodiscard]] const JointVector& lower_rad() const noexcept { return lower_rad_; }
   [[nodiscard]] const JointVector& upper_rad() const noexcept { return upper_rad_; }
   [[nodiscard]] const JointVector& start_rad() const noexcept { return start_rad_; }
-  [[nodiscard]] const JointVector& gear_stiffness_Nm_per_rad() const noexcept {
-    return gear_stiffness_;
-  }  // 0: the gear is rigid
+  // 0: the gear is rigid.
+  [[nodiscard]] const JointVector& gear_stiffness_Nm_per_rad() const noexcept { return gear_stiffness_; }
 
   // Returns the index of the drive of the k-th joint of the chain, counted outwards from the base.
   [[nodiscard]] int drive_along_chain(std::size_t k) const noexcept { return links_[k].drive; }

@@ -37,8 +37,8 @@ struct BusDescription {
   bool operator==(const BusDescription&) const = default;
 };
 
-// A Modbus line: one TCP connection for each device, or one serial line for all devices. The devices are drives, a
-// sensor, or both. A Modbus line isn't a CAN bus, so SYNC, `--bus` and the bus budget don't include it.
+// A Modbus line: one TCP connection for each device, or one serial line for all devices. A device is a drive or the
+// sensor. A Modbus line isn't a CAN bus, so SYNC, `--bus` and the bus budget don't include it.
 struct ModbusLineDescription {
   std::string name;
   std::string host;    // TCP: the numeric IPv4 address; empty for a serial line
@@ -156,8 +156,8 @@ struct BringUp {
   // Longest time from the request for operation until the drive follows targets; none: the session's value, 5 s.
   std::optional<double> enable_timeout_s;
   // The other fields are for cia402 only:
-  double start_timeout_s =
-      2.0;  // time until the drive's first answer, and until the drive shows a change of its NMT state
+  // Longest time until the drive's first answer, and until the drive shows a change of its NMT state.
+  double start_timeout_s = 2.0;
   double answer_timeout_s = 0.2;  // time for each SDO request; a request is sent three times
   // Whether 6061h shows the mode only after operation is enabled.
   bool shows_mode_enabled = false;
@@ -215,8 +215,8 @@ struct DriveDescription {
   SimulatedDrive simulation;
 
   [[nodiscard]] double counts_per_rad() const noexcept;  // has the sign of `direction`
-  [[nodiscard]] double angle_rad(std::int32_t counts)
-      const noexcept;  // the motor's angle at the joint (the motor's angle divided by the gear ratio)
+  // Returns the motor's angle divided by the gear ratio.
+  [[nodiscard]] double angle_rad(std::int32_t counts) const noexcept;
   [[nodiscard]] bool on_can() const noexcept { return profile != "modbus"; }
 
   bool operator==(const DriveDescription&) const = default;
@@ -286,8 +286,7 @@ struct CellLimits {
                                         std::numeric_limits<double>::infinity(),
                                         std::numeric_limits<double>::infinity()};
   std::vector<BoxDescription> keep_out;  // boxes that the rendered point may not enter
-  double setpoint_bandwidth_Hz =
-      25.0;  // bandwidth of the filter that prevents elastic gears from ringing; 0: no filter
+  double setpoint_bandwidth_Hz = 25.0;   // of the filter that prevents elastic gears from ringing; 0: no filter
 
   bool operator==(const CellLimits&) const = default;
 };

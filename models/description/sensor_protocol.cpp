@@ -213,8 +213,8 @@ struct Reader {
       frame.id = read_id(node);
     }
     const auto capacity = static_cast<std::int64_t>(protocol.frame_capacity());
-    const std::vector<std::int64_t> lengths{1,  2,  3,  4,  5,  6,  7, 8,
-                                            12, 16, 20, 24, 32, 48, 64};  // lengths of CAN FD frames
+    // The possible lengths of CAN FD frames.
+    const std::vector<std::int64_t> lengths{1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
     const auto bytes = named ? std::int64_t{frame.bytes} : integer_of(node, "bytes", lengths);
     if (bytes < 1 || bytes > capacity) {
       throw node.error_at(named ? "message" : "bytes", "one of 1 to " + std::to_string(capacity) + " bytes");

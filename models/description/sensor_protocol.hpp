@@ -69,7 +69,7 @@ struct NumberField {
 
 struct SensorSignal {
   NumberField number;
-  double scale = 1.0;  // N or Nm per count; with a matrix: the unit of the matrix column per count
+  double scale = 1.0;  // N or Nm per count. With a matrix: per count, in the unit of the matrix column.
   double offset = 0.0;
   // Numbers at or beyond saturated_below or saturated_above are saturated. By default, these are the ends of the range
   // of the bits.
@@ -117,8 +117,8 @@ struct SensorRegisters {
 
 struct SensorProtocol {
   bool extended = false, fd = false, bit_rate_switch = false;
-  std::optional<SensorRegisters>
-      registers;  // for a sensor on Modbus; `frames` then has one frame with the bytes of the registers
+  // For a sensor on Modbus. `frames` then has one frame with the bytes of the registers.
+  std::optional<SensorRegisters> registers;
   bool has_base_id = false, has_settings = false;
   std::uint32_t base_id_min = 0, base_id_max = 0, base_id_step = 1;
   std::vector<SampleFrame> frames;

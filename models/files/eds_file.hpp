@@ -29,7 +29,8 @@ struct EdsObject {
   bool readable = true, writable = true, mappable = false;
   // `value` is set by a DCF.
   std::optional<std::uint32_t> default_value, value;
-  // Replaces default_value if the default is relative to $NODEID: the default is this plus the node's number.
+  // Replaces default_value if the default is relative to $NODEID: the default is then default_offset plus the node's
+  // number.
   std::optional<std::uint32_t> default_offset;
   std::string default_text;  // the default if the object is a text, which has no bits
   // The limits; nullopt if the file's limits make no sense.

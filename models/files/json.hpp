@@ -67,9 +67,8 @@ class Json {
   [[nodiscard]] std::optional<std::string> text_of(std::string_view key) const;
   [[nodiscard]] std::optional<std::int64_t> integer_of(std::string_view key) const noexcept;
 
-  [[nodiscard]] const std::vector<Json>& items() const noexcept {
-    return items_;
-  }  // items of a list, or values of an object
+  // Returns the items of a list, or the values of an object.
+  [[nodiscard]] const std::vector<Json>& items() const noexcept { return items_; }
 
  private:
   enum class Kind : std::uint8_t { null, truth, integer, real, text, list, object };

@@ -91,7 +91,7 @@ bool insert_key(std::string& text, const std::vector<YamlStep>& path, const std:
   if (!last) return false;
   const std::size_t begin = line_begin(text, last->line), next = line_begin(text, last->line + 1);
   const bool whole = next > begin && text[next - 1] == '\n';
-  // Keeps ends of lines that have two characters.
+  // If the file's lines end in two characters ("\r\n"), the new line does too.
   const std::string end = whole && next - begin > 1 && text[next - 2] == '\r' ? "\r\n" : "\n";
   text.insert(
       next, (whole ? "" : end) + std::string(static_cast<std::size_t>(last->column), ' ') + entry + (whole ? end : ""));

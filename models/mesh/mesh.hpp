@@ -105,9 +105,8 @@ class TriangleMesh {
   [[nodiscard]] double mean_edge_m() const noexcept { return mean_edge_; }
   [[nodiscard]] std::size_t bytes() const noexcept;  // the memory that the mesh uses
   [[nodiscard]] std::size_t dropped_triangles() const noexcept { return structure_.dropped; }
-  [[nodiscard]] bool closed() const noexcept {
-    return structure_.closed;
-  }  // whether each edge has one face on either side
+  // Whether each edge has one face on either side.
+  [[nodiscard]] bool closed() const noexcept { return structure_.closed; }
 
   // Returns what `find` returned in the first call. crossing_faces() (mesh_crossings.hpp) passes `find`; several parts
   // of a session ask for its result. Copies of a mesh have the same faces and share the result. For set-up, not for the

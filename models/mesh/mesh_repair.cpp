@@ -294,8 +294,8 @@ std::vector<bool> surfaces_on_their_own(const TriangleSoup& soup, const std::vec
 }  // namespace
 
 RepeatedFaces leave_out_repeated(TriangleSoup& soup) {
-  std::vector<std::tuple<Corners, std::uint32_t, bool>>
-      faces;  // corners, face, whether sorting turned the face's front
+  // For each face: the sorted corners, the index, and whether sorting turned the face's front.
+  std::vector<std::tuple<Corners, std::uint32_t, bool>> faces;
   faces.reserve(soup.triangles.size());
   for (std::uint32_t f = 0; f < soup.triangles.size(); ++f) {
     const auto [corners, turned] = in_order(soup.triangles[f]);

@@ -43,8 +43,8 @@ class BoundsTree {
   }
 
   // Returns the minimum of `least` and of distance(index) over all leaves. Skips leaves whose box is no nearer to x
-  // than the smallest distance so far, unless x is in the box. Precondition: distance(index) is at least the distance
-  // to the leaf's box, or x is in the box; then distance(index) may be negative.
+  // than the smallest distance so far, unless x is in the box. Precondition: if x is outside a leaf's box,
+  // distance(index) is at least the distance from x to this box. (If x is in the box, distance(index) may be negative.)
   template <typename Distance>
   [[nodiscard]] double nearest(const Vec3& x, double least, Distance distance) const noexcept {
     if (nodes_.empty()) return least;

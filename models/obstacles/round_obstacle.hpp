@@ -209,7 +209,7 @@ class RoundObstacle final : public Obstacle {
     const double along_p = n.dot(p - line.foot);  // p's coordinate along the normal, from line.foot
     double along = sign_ * R_;
     if (layer_.soft()) {
-      // The balance is K (along − along_p) = k (surface − along), up to the layer's thickness.
+      // The balance is K (along − along_p) = k (surface − along), and the layer yields by its thickness at most.
       const double k = layer_.stiffness_N_per_m;
       along = std::max((K * along_p + k * along) / (K + k), along - layer_.thickness_m);
     }
