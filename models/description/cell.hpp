@@ -155,8 +155,8 @@ enum class StopsBy : std::uint8_t {
 struct BringUp {
   // Longest time from the request for operation until the drive follows targets; none: the session's value, 5 s.
   std::optional<double> enable_timeout_s;
-  // The other fields are for cia402 only:
-  // Longest time until the drive's first answer, and until the drive shows a change of its NMT state.
+  // The other fields are for cia402 only: Longest time until the drive's first answer, and until the drive shows a
+  // change of its NMT state.
   double start_timeout_s = 2.0;
   double answer_timeout_s = 0.2;  // time for each SDO request; a request is sent three times
   // Whether 6061h shows the mode only after operation is enabled.
@@ -209,7 +209,7 @@ struct DriveDescription {
   double rotor_inertia_kg_m2 = 0.0;         // at the joint
   // Bandwidth of the drive's position loop, from its maker or from a test. The stability check assumes this lag.
   double position_bandwidth_Hz = 100.0;
-  // 0: the gear is taken as rigid. Used to compensate for the deflection by gravity.
+  // The controller uses this to compensate for the gear's deflection by gravity. 0: the gear is taken as rigid.
   double gear_stiffness_Nm_per_rad = 0.0;
   std::optional<double> gear_damping_Nms_per_rad;  // only used by the stability check; none: unknown
   SimulatedDrive simulation;

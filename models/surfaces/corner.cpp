@@ -7,8 +7,8 @@ namespace proxarm::models {
 CornerPoint::CornerPoint(const FlatSurface<3>& a, const FlatSurface<3>& b, const FlatSurface<3>& c) noexcept {
   const Vec3 bc = b.normal().cross(c.normal()), ca = c.normal().cross(a.normal()), ab = a.normal().cross(b.normal());
   const double volume = a.normal().dot(bc);
-  // The triple product of the unit normals has a rounding error of a few 1e-16. If it is below 1e-14, the corner's
-  // position has less than two correct digits.
+  // The triple product of the unit normals has a rounding error of a few 1e-16. If the triple product is below 1e-14,
+  // the corner's position has less than two correct digits.
   exists = std::abs(volume) > 1e-14;
   if (!exists) return;
   dual.row(0) = bc / volume;

@@ -250,7 +250,8 @@ bool World::add_those_at(double K, const Vec3& p, const Vec3& q, const Vec3& r) 
   return pressed_.size() > before;
 }
 
-// Reduces pressed_ to the obstacles that would hold the proxy without friction, and to the obstacles next nearest.
+// Reduces pressed_ to `chosen` obstacles: the obstacles that would hold the proxy without friction, and the obstacles
+// that are nearest after these.
 // 1. Each obstacle is replaced by a plane: the tangent plane at the end of the obstacle's step alone.
 // 2. p is projected onto the polyhedron of these planes by a dual method. It starts at r = p.
 // 3. Each exchange adds the plane that r is deepest behind to the planes that hold r, and moves r to the point nearest
