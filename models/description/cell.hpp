@@ -155,8 +155,8 @@ enum class StopsBy : std::uint8_t {
 struct BringUp {
   // Longest time from the request for operation until the drive follows targets; none: the session's value, 5 s.
   std::optional<double> enable_timeout_s;
-  // The other fields are for cia402 only: Longest time until the drive's first answer, and until the drive shows a
-  // change of its NMT state.
+  // cia402 (as all fields below): longest time until the drive's first answer, and until the drive shows a change of
+  // its NMT state.
   double start_timeout_s = 2.0;
   double answer_timeout_s = 0.2;  // time for each SDO request; a request is sent three times
   // Whether 6061h shows the mode only after operation is enabled.
