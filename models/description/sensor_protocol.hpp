@@ -69,7 +69,7 @@ struct NumberField {
 
 struct SensorSignal {
   NumberField number;
-  double scale = 1.0;  // N or Nm per count. With a matrix: per count, in the unit of the matrix column.
+  double scale = 1.0;  // N or Nm per count; with a matrix, the matrix column's unit per count
   double offset = 0.0;
   // Numbers at or beyond saturated_below or saturated_above are saturated. By default, these are the ends of the range
   // of the bits.

@@ -127,8 +127,8 @@ class CoulombStep {
       const double change = (row[k] - last).norm();
       if (change > least && least <= 100.0 * rounding) break;
       least = change;
-      // If the last two values agree within rounding, the earlier value is taken, because its rounding error is a
-      // quarter of the later value's.
+      // If the last two values agree within rounding, the earlier value is taken, because the later value has four
+      // times as much rounding error.
       R = change <= 0.5 * rounding ? last : row[k];
       high = sample;
       if (change <= rounding) break;
