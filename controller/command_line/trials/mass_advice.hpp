@@ -13,8 +13,8 @@ namespace proxarm::command_line {
 std::optional<double> smallest_with_margins(const controller::HandModel& hand, const controller::LoopModel& loop);
 
 // Returns the smallest of controller::tried_dampings with which smallest_with_margins() is at most half of what it is
-// without added damping; nullopt if there is none. The damping is at most 20 Ns/m, which at 0.2 m/s gives 4 N; with
-// more, a hand would take the handle for a heavier one.
+// without added damping; nullopt if there is none. The damping is at most 20 Ns/m: at 0.2 m/s that gives 4 N, which a
+// hand still takes for a heavier handle, not for resistance.
 inline constexpr double most_for_comfort_Ns_per_m = 20.0;
 std::optional<controller::DampedMass> worthwhile_damping(const controller::HandModel& hand,
                                                          const controller::LoopModel& loop);
