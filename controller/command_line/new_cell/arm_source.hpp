@@ -13,20 +13,20 @@ namespace proxarm::command_line {
 struct ChainJoint {
   std::string name;
   bool slides = false;
-  std::array<double, 2> range{};  // rad or m: the URDF's limits with a small margin
+  std::array<double, 2> range{};  // rad or m; the URDF's limits less a small margin
   double max_speed = 0.0;         // 0: not stated
   double max_effort = 0.0;        // Nm or N; 0: not stated
 };
 
 struct ArmSource {
-  std::string name;                  // of the robot
-  std::string tip;                   // link that carries the sensor
-  std::vector<ChainJoint> joints;    // outwards from the base
-  std::string urdf;                  // written beside the cell: the chain's joints move, all others are fixed
-  std::vector<std::string> remarks;  // changes and estimates, a line each
+  std::string name;                  // the robot's name
+  std::string tip;                   // the link that carries the sensor
+  std::vector<ChainJoint> joints;    // the chain's joints, outwards from the base
+  std::string urdf;                  // text of the URDF beside the cell, in which only the chain's joints move
+  std::vector<std::string> remarks;  // changes of the URDF and estimates, one line each
 };
 
-// Reads the file, a xacro through the program xacro, and makes a URDF of it from which an arm can be built:
+// Reads the URDF, or expands the xacro by the program xacro, and makes a URDF from which an arm can be built:
 //   - The chain goes from the root to --tip. Without --tip it goes to where the moving joints end or branch (a
 //     gripper's
 //     fingers), and on to the link called tool0 or flange there, if any.

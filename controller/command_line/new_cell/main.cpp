@@ -1,6 +1,6 @@
-// The program that `proxarm new-cell` becomes. It is separate because it is used once for an arm.
+// Defines the program that `proxarm new-cell` becomes. It is a separate program because it is used once for an arm.
 //
-// Exit status: 0 fine, 2 set-up mistake.
+// Exit status: 0: fine; 2: set-up mistake.
 #include <CLI/CLI.hpp>
 #include <memory>
 
