@@ -149,7 +149,7 @@ void print_delays(const Tuned& of) {
 }
 
 void print_mass(const Tuned& of, const std::optional<double>& smallest) {
-  LoopModel start = of.session.loop;  // in the start pose
+  LoopModel start = of.session.loop;  // the loop in the start pose
   start.horizon_s = 0.0;
   const std::string at_start = mass_text(smallest_felt(of.hand, start));
   of.stages.done();
@@ -287,7 +287,8 @@ std::string print_limits(const Tuned& of, const std::optional<double>& smallest)
   of.stages.begin(in_poses("what limits the mass", of.loop.arms->size()));
   const auto sorted = limits(of.session, of.loop, of.hand);
   of.stages.done();
-  constexpr double no_mass = 1e9, gain = 0.9;  // a part counts if the mass without it is a tenth smaller
+  // A part of the loop is said to limit the mass if without that part the mass is smaller by a tenth or more (`gain`).
+  constexpr double no_mass = 1e9, gain = 0.9;
   const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
   const std::string limit = helps ? sorted.front().what : "none of these alone";
   std::printf("what limits it: %s; without %s the smallest stable mass would be %s\n", limit.c_str(),

@@ -435,7 +435,7 @@ std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::
     if (scheduled.taken && scheduled.refusal == nullptr) return;
     idle.push_back({change.text, change.time_s, scheduled.taken ? scheduled.refusal : "the session had ended before"});
   };
-  // timed_texts() has the order in which the changes were scheduled.
+  // timed_texts() returns the changes in the order in which they were scheduled.
   auto next = cycle.scheduled_changes().begin();
   auto next_timestep = cycle.scheduled_timesteps().begin();
   for (const TimedText& change : timed_texts(texts)) {

@@ -1,8 +1,8 @@
 // Changes the parameters of a running session by text, such as "mass=3", "damping=20Ns/m" or "spring=0". A change of an
 // object names the object: "wall.friction=0.5", "plate.position_m=0.1,0,0".
 //
-// Each change is checked as the options are at the session's start, with all earlier changes made. A refused change has
-// no effect.
+// Each change goes through the checks of the session's start, with all earlier changes made. A refused change has no
+// effect.
 #pragma once
 
 #include <memory>

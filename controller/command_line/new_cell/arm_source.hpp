@@ -27,13 +27,13 @@ struct ArmSource {
 };
 
 // Reads the URDF, or expands the xacro by the program xacro, and makes a URDF from which an arm can be built:
-//   - The chain goes from the root to --tip. Without --tip it goes to where the moving joints end or branch (a
-//     gripper's
-//     fingers), and on to the link called tool0 or flange there, if any.
+//   - The chain goes from the root to --tip. Without --tip it goes to where the moving joints end or branch (into a
+//     gripper's fingers), and on to a link that is fixed there and has a usual name, such as tool0 or flange, if there
+//     is one.
 //   - Joints beside the chain, mimic joints included, are fixed at their zero.
 //   - Links on the chain without a physical <inertial> get an estimate (link_inertia.hpp).
-//   - Meshes get their file paths (package:// by --package and ROS_PACKAGE_PATH). Meshes that can't be drawn are left
-//     out.
+//   - Names of meshes are replaced by file paths (package:// by --package and ROS_PACKAGE_PATH). Meshes that can't be
+//     drawn are left out.
 // Throws SetupError.
 ArmSource read_arm(const NewCellOptions& options);
 

@@ -22,7 +22,7 @@ void add_options(CLI::App& app, NewCellOptions& options) {
   app.add_option("--package", options.packages, "where a package is that the file names; repeated: more")
       ->type_name("NAME=DIR")
       ->expected(1)
-      ->allow_extra_args(false)  // a xacro's arguments may follow
+      ->allow_extra_args(false)  // because a xacro's arguments may follow
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_option("--out", options.out, "folder for the cell and what it names (default: named after the robot)")
       ->type_name("DIR");

@@ -342,8 +342,8 @@ class NewCell {
                       .expected = "buses that carry a timestep of 10 ms or less"});
   }
 
-  // Returns the smallest mass with which the simulated arm is steady: first with the default scene's hand, which moves
-  // in a plane, and then with a hand that moves freely in all directions. Returns nullopt if there is none.
+  // Returns the smallest tried mass with which the simulated arm is steady with two hands: the default scene's hand,
+  // which moves in a plane, and a hand that moves freely in all directions. Returns nullopt if no tried mass is.
   std::optional<double> advised_mass() {
     const PreparedSession session = prepare(run_);
     controller::LoopModel loop = led_loop(session);

@@ -470,8 +470,8 @@ std::vector<description::Grip> other_grips(const description::HandDescription& h
 }
 }  // namespace
 
-// To save time, a grip's smallest stable mass is computed only if the largest such mass of the earlier grips is
-// unstable with this grip.
+// To save time, a grip's smallest stable mass is computed only if the largest of the earlier grips' smallest stable
+// masses is unstable with this grip.
 controller::HandModel hand_model(const PreparedSession& session, controller::LoopModel loop) {
   const description::Grip tightest = description::tightest_grip(session.hand);
   controller::HandModel worst = held_with(tightest, session.hand.mass_kg);

@@ -21,7 +21,7 @@ struct PreparedSession {
   description::SensorDescription sensor;
   description::HandDescription hand;
   scenes::Scene scene;
-  std::shared_ptr<const scenes::Clearances> clearances;  // of the scene
+  std::shared_ptr<const scenes::Clearances> clearances;  // of the scene's objects
   std::shared_ptr<const models::PoseAlgorithm> rigid;    // the scene with its rigid tool; null: the tool is a point
   controller::SessionSettings settings;
   double duration_s = 10.0;

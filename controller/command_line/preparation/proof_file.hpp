@@ -22,7 +22,7 @@ struct ProofFile {
   std::string cell_sha256;  // hash of the cell's file, its URDF and its sensor's file, one after the other
   bool real_arm = false;    // false: a simulated arm
   std::string date;         // UTC
-  std::string verdict;      // for people
+  std::string verdict;      // what was proven, as text for people
   bool whole = true;        // true: signs, ratios, sensor and brakes are proven; false: only the bus loss is
   std::vector<ProvenStop> bus_loss;
 };

@@ -18,7 +18,7 @@ void require_runnable(const PreparedSession& session, const RunOptions& options)
 // (scenes/mesh_files/mesh_report.hpp), a rigid tool longer than the arm, and a weight of the arm that takes too much of
 // a drive's torque (controller/setpoints/held_weight.hpp).
 std::vector<std::string> surprises(const PreparedSession& session);
-void warn_of_surprises(const PreparedSession& session);  // on standard error
+void warn_of_surprises(const PreparedSession& session);  // prints these lines on standard error
 
 // Throws SetupError if
 // - the arm can't be built, for example because the URDF lacks a drive's joint;

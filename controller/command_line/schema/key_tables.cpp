@@ -165,7 +165,7 @@ class Cases {
 };
 
 // Returns the cases of a key that a table shows. If the key's maps may have maps of defaults, only the cases without
-// such defaults are shown.
+// maps of defaults are shown.
 std::vector<KeyCase> told(const KeyModel& key) {
   std::vector<KeyCase> cases = key.cases;
   if (std::erase_if(cases, [](const KeyCase& one) { return one.is_wide; }) == 0) return cases;

@@ -3,8 +3,8 @@
 // Each page has its own time in the record, and requests the cycles that it shows. The requests, each with its answer:
 //   {"at": INDEX}             the moment of that cycle
 //   {"frames": INDEX}         {"frames": {"at": INDEX, "list": [{bus, id, bytes, from, words}, …]}}
-//   {"spectrum": INDEX}       {"spectrum": {"at": INDEX, …}}: the handle's vibration of the second before
-//   (vibration.hpp)
+//   {"spectrum": INDEX}       {"spectrum": {"at": INDEX, …}}, the handle's vibration in the second before that cycle
+//                             (vibration.hpp)
 //   {"window": [FROM, TO]}    a history of at most 800 rows
 #pragma once
 
