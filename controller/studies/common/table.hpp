@@ -27,7 +27,7 @@ class Table {
   // Makes an empty table with these columns, preceded by a column `job` for the number of the job that made a row.
   explicit Table(std::vector<Column> columns);
 
-  // Adds a row that job made. The row's cells belong to the columns after the column `job`.
+  // Adds a row that the job of this number made. The row's cells belong to the columns after the column `job`.
   void add(std::size_t job, const Row& row);
   // Sorts the rows by their jobs. The order of each job's rows stays.
   void sort_by_job();

@@ -19,8 +19,8 @@ struct Runs {
   std::vector<double> T{}, steps{};
   std::vector<Spread> error{};
   std::vector<double> cost_ns{};
-  double timing_low = 1.0,
-         timing_high = 1.0;  // tenth and ninetieth percentile of the step times, divided by their median
+  // Tenth and ninetieth percentile of the time of a step, divided by the median time.
+  double timing_low = 1.0, timing_high = 1.0;
 
   // Returns the least run time for which nine of ten phases keep the error below `target`, at that run's timestep and
   // at all finer ones. Returns infinity if no timestep does.

@@ -27,7 +27,7 @@ constexpr std::array step_counts{60, 120, 240, 480, 960, 1920, 3840, 7680};
 constexpr int steps_of_1_ms = 960;
 
 struct ToolRun {
-  double place_m = 0.0, turn_rad = 0.0;  // rms
+  double place_m = 0.0, turn_rad = 0.0;  // rms over the steps
   int unresolved = 0;
 };
 

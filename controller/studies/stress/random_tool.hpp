@@ -26,8 +26,9 @@ RandomToolScene random_tool_scene(Random& random);
 // or the tool is one, or both are. Up to two further objects are solids or planes. No object moves.
 RandomToolScene random_mesh_tool_scene(Random& random);
 
-// Sets three of four objects in motion: to and fro with 1 mm/s to 0.3 m/s at 0.3 to 8 Hz, straight ahead with up to 20
-// mm/s, or turning with up to 3 rad/s. An object turns about an axis through its middle, a plane about its normal.
+// Sets each object in motion with a probability of three in four: to and fro with 1 mm/s to 0.3 m/s at 0.3 to 8 Hz,
+// straight ahead with up to 20 mm/s, or turning with up to 3 rad/s. An object turns about an axis through its middle, a
+// plane about its normal.
 void set_in_motion(Random& random, scenes::Scene& scene);
 
 }  // namespace proxarm::studies

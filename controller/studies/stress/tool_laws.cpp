@@ -478,7 +478,8 @@ std::string ToolLaws::missed(const ToolCall& call) const {
     if (std::abs(contact.gap_m) > (hollow_ ? 1e-10 : 1e-12) && f_n > 1e-9 * size) return "a force over a gap";
     const double limit = friction(contact) * f_n;
     // In hollow objects contacts may press against each other. Their forces are then exact to 1e-10 of √(eᵀK e), which
-    // the contact's compliance converts to a force. In other objects 𝒢 removes such an excess over the cone.
+    // the contact's compliance converts to a force. With other objects 𝒢 removes any excess of a force over the
+    // contact's cone.
     double beyond = 1e-11 * size;
     if (hollow_) {
       const Twist e = models::difference(call.r, call.p);
@@ -487,8 +488,8 @@ std::string ToolLaws::missed(const ToolCall& call) const {
     if (!(f_t.norm() <= limit + beyond)) return "out of the cone";
     // A contact whose slip is much smaller than the displacement that friction causes at the contact nearly sticks, so
     // the slip's direction counts less. The slip s is a difference of two places, and is exact to ε = 8 roundings:
-    // those of both poses, and of points rotated with the poses (up to 5 roundings have occurred). If friction is
-    // against the exact slip s₀ = s − e, with ‖e‖ ≤ ε, it deviates from the direction of s by
+    // those of both poses, and of points rotated with the poses (up to 5 roundings have occurred). Friction that is
+    // against the exact slip s₀ = s − e, with ‖e‖ ≤ ε, deviates from friction against s by
     //   μ f_n ‖s/‖s‖ − s₀/‖s₀‖‖ ≤ 2 μ f_n ε/‖s‖
     // The same limit holds for a contact that sticks, where s₀ = 0 and ‖s‖ ≤ ε, with any direction of friction.
     const Vec3 slip = call.slip_of(contact);
