@@ -53,20 +53,20 @@ struct ScanOptions {
 
 struct ProveOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the controller's cell
   std::filesystem::path out;  // empty: beside the cell
   bool bus_loss = false;      // test only how the drives stop when the controller falls silent
 };
 
 struct ZeroOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the controller's cell
   std::filesystem::path out;  // empty: beside the cell
 };
 
 struct IdentifyOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the controller's cell
   // Identify friction, rotors and gears of the joints, instead of the load behind the sensor.
   bool joints = false;
   bool compare = false;  // compare the identified values with those in the cell and its zero file

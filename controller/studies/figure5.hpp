@@ -17,7 +17,7 @@ struct Figure5Setup {
   double stiffness_N_per_m = 750.0;
   double damping_Ns_per_m = 8.0;
   double filter_Hz = 30.0;
-  double device_mass_kg = 0.09;  // a small desktop device's at the tool, with the fingers that hold it
+  double device_mass_kg = 0.09;  // as of a small desktop device at its tool, including the fingers that hold it
   double hand_stiffness_N_per_m = 150.0;
   double hand_damping_Ns_per_m = 2.0;
   double duration_s = 5.0;

@@ -10,7 +10,7 @@ namespace proxarm::command_line {
 
 struct CalibrateOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the controller's cell
   // For each pose, the angles of all joints as marked on the arm. Empty: one pose, start_rad.
   std::vector<std::vector<double>> at;
   bool home = false;  // move the joints with incremental encoders to their home

@@ -14,7 +14,7 @@ namespace proxarm::command_line {
 // How a drive stopped by itself after the controller was silenced on purpose.
 struct ProvenStop {
   std::string joint;
-  double after_ms = 0.0;  // since the controller's last frame
+  double after_ms = 0.0;  // time from the controller's last frame to the stop
   std::string signs;      // what the drive reported, as text for people
 };
 

@@ -99,8 +99,8 @@ class ToolLaws {
   [[nodiscard]] double pushed_J(const ToolCall& call, double short_m) const;
 
   // Returns a bound of the energy that contacts may add because the tool goes over an edge from one feature of an
-  // object to another. At the edge the normal turns by α at once, from n₀, the normal of the first feature, to n. With
-  // s, the displacement of the contact point's material point since q:
+  // object to another. At the edge the normal turns by α at once, from n₀, the normal of the first feature, to n. Let s
+  // be the displacement since q of the material point at the contact.
   //   1. Along n₀ the contact point reached the first feature or was held by it, so n₀ᵀs ≤ 0 except for curvature.
   //   2. Therefore nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖.
   // Precondition: the step's parts show that the tool goes over an edge (tool_parts.hpp). `earlier`: the contacts of
