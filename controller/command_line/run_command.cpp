@@ -46,7 +46,7 @@ void refuse_for_interfaces(const RunOptions& options) {
 
 namespace {
 
-// Returns the simulated arm: the session's own cell, or another cell with the same wiring.
+// Returns the session of the simulated arm: `session`, or that of another cell (--arm) with the same buses.
 PreparedSession prepared_arm(const PreparedSession& session, RunOptions options) {
   if (options.arm.empty()) return session;
   options.cell = options.arm;

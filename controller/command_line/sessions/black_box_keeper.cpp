@@ -30,8 +30,8 @@ using controller::BoxFrame;
 
 constexpr const char* default_folder = "proxarm-black-box";
 
-// A TPDO and a setpoint per axis; SYNC, heartbeats, the sensor's poll and frames; doubled for other traffic on the
-// buses.
+// Returns for how many frames per cycle the box has room: a TPDO and a setpoint per axis, and eight for SYNC,
+// heartbeats and the sensor's poll and frames. The sum is doubled for other traffic on the buses.
 std::size_t frames_per_cycle(const description::Cell& cell) { return 2 * (2 * cell.drives.size() + 8); }
 
 fs::path folder_for(const RunOptions& options) {
@@ -39,7 +39,7 @@ fs::path folder_for(const RunOptions& options) {
   return options.record_dir.empty() ? fs::path(default_folder) : options.record_dir / "black-box";
 }
 
-// If the timestep may change, the box has room for cycles down to 1 ms.
+// Returns the shortest timestep for which the box has room. If the timestep may change, that is at most 1 ms.
 double shortest_period_s(const PreparedSession& session, const RunOptions& options) {
   const double period_s = session.settings.period_s;
   const bool may_change = !options.control.empty() || !options.changes.empty();
@@ -99,7 +99,7 @@ std::vector<fs::path> replay_files(const PreparedSession& session) {
 struct BlackBoxKeeper::Shared {
   controller::ReplayHead head;
   std::array<char, 2048> reason{};
-  std::atomic<bool> written{false};  // by the keeper, once everything is on the disk
+  std::atomic<bool> written{false};  // set by the keeper when everything is on the disk
 };
 
 namespace {
@@ -154,7 +154,7 @@ bool BlackBoxKeeper::finish(const std::string& reason) {
   return shared_->written.load();
 }
 
-// Runs in the keeper's process.
+// Waits for the session's end, and writes the box if necessary. Runs in the keeper's process.
 void BlackBoxKeeper::keep(int said) {
   prctl(PR_SET_NAME, "proxarm-box");
   ignore_ending_signals();
@@ -166,7 +166,8 @@ void BlackBoxKeeper::keep(int said) {
   const bool died = got <= 0;
   if (!died && word == 'f') _exit(0);
   try {
-    // A session that ended before its first cycle has reported that already, and there is nothing to write.
+    // If the session ended before its first cycle, there is nothing to write, and the session has reported the reason
+    // itself.
     if (box_.cycles() > 0) {
       write(died ? "The session ended without a word: the program crashed or was killed." : shared_->reason.data());
       if (died) std::fprintf(stderr, "proxarm: the session died; its black box is in %s\n", folder_.c_str());

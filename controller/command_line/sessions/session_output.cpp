@@ -24,7 +24,7 @@ using controller::CycleRecord;
 using controller::Summary;
 
 constexpr const char* default_plot = "proxarm-run.svg";
-// A force of this many times empty_handle_N is above the band of an empty handle, even while the tool rings.
+// A force above empty_handle_N times this factor isn't from an empty handle, even while the tool rings.
 constexpr double felt_bands = 4.0;
 
 std::string rendered_text(const PreparedSession& session) {
@@ -45,7 +45,7 @@ std::string plot_title(const PreparedSession& session) {
   return session.scene.name + ": " + rendered_text(session) + period;
 }
 
-// Says when each clock of the scripts started; empty without a script.
+// Returns a text that says when the clock of each script started; empty if the options have no script.
 std::string clocks_text(const Summary& summary, const RunOptions& options) {
   if (options.faults.empty() && options.changes.empty() && options.orders.empty() && options.enabling.empty())
     return "";
@@ -94,8 +94,8 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   writer_->write_file("effective.yaml", effective_config(session));
 }
 
-// Refuses a bad plot file before the run instead of after it. The file must end in .svg, so --plot can overwrite
-// nothing but a picture.
+// Throws SetupError before the run if the plot's file can't be written. Its name must end in .svg, so that --plot
+// overwrites no file but a picture.
 void SessionOutput::refuse_lost_plot() const {
   const fs::path& file = options_.plot_file;
   if (file.empty()) return;
@@ -111,9 +111,9 @@ void SessionOutput::refuse_lost_plot() const {
 }
 
 namespace {
-// The stability check models a rigid arm, so it doesn't see this ringing of the gears.
+// Warns if the setpoints may make the gears ring. The stability check doesn't see this ringing.
 void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
-  constexpr double most_modes = 3.0;  // measured: docs/studies.md
+  constexpr double most_modes = 3.0;  // measured (docs/studies.md)
   const double bandwidth_Hz = cell.limits.setpoint_bandwidth_Hz;
   if (!(bandwidth_Hz >= most_modes * mode_Hz)) return;
   std::fprintf(
@@ -126,7 +126,8 @@ void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
 }  // namespace
 
 namespace {
-// Says what an arm with more or fewer than six axes does with them, if its drives take positions.
+// Returns a text that says how an arm of the admittance type with more or fewer than six axes moves; empty for six
+// axes.
 std::string axes_text(int axes, int dimensions) {
   if (axes == 6) return "";
   const std::string count = std::to_string(axes) + (axes == 1 ? " axis" : " axes");
@@ -142,7 +143,7 @@ void SessionOutput::introduce() const {
   const models::Arm& arm = deriver_.arm();
   const double mode_Hz = arm.first_elastic_frequency_Hz(arm.start_rad());
   if (!session_.impedance()) warn_if_it_chatters(session_.cell, mode_Hz);
-  if (options_.json) return;  // then only the summary goes to standard output
+  if (options_.json) return;  // with --json only the summary goes to standard output
   const models::ToolSpace reach = models::tool_space(arm);
   const models::TipMass tip = arm.effective_mass_range(arm.start_rad(), reach.dimensions);
   std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
@@ -159,7 +160,7 @@ void SessionOutput::introduce() const {
   std::fflush(stdout);
 }
 
-// Printed on standard error when it matters.
+// If the session holds or was stopped by a fault, prints on standard error how a pinned person gets free.
 void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
   const std::string& brakes = session_.cell.supervision.brake_release;
   const std::string by_hand = brakes.empty() ? "" : "; brakes: " + brakes;
@@ -176,7 +177,8 @@ void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
   }
 }
 
-// Printed on standard error: the client who asked was told only that the change began.
+// Prints on standard error whether the drives took a new timestep. The client who asked for the timestep was told only
+// that the change began.
 void SessionOutput::say_timestep(const CycleRecord& record) {
   if (record.refused_period_ns > 0) {
     std::fprintf(stderr,
@@ -198,14 +200,16 @@ void SessionOutput::say_timestep(const CycleRecord& record) {
   }
 }
 
-// A sample that comes a cycle late is a cycle older when it acts.
+// Returns the loop with the present age of samples. A sample that comes a cycle late is a cycle older when it takes
+// effect.
 controller::LoopModel SessionOutput::judged_loop() const {
   controller::LoopModel loop = loop_;
   if (samples_late_) loop.delay_s += loop.period_s;
   return loop;
 }
 
-// Finds whether most samples of the last quarter of a second were late; the loop is then judged with their age.
+// Finds whether most samples of about the last quarter of a second were late. If so, the loop is judged with the age of
+// late samples.
 void SessionOutput::follow_lateness(const CycleRecord& record) {
   constexpr double average_s = 0.25;
   const double period_s = 1e-9 * static_cast<double>(record.period_ns);
@@ -221,7 +225,7 @@ void SessionOutput::follow_lateness(const CycleRecord& record) {
                1e-9 * static_cast<double>(record.time_ns), 1e3 * period_s);
 }
 
-// Warns on standard error as it happens, once for each lasting spell.
+// Warns on standard error while the arm oscillates, once for each lasting spell.
 void SessionOutput::say_oscillation() {
   const controller::Oscillation present = builder_.oscillation();
   if (present.lasts && !told_oscillation_) {
@@ -232,7 +236,8 @@ void SessionOutput::say_oscillation() {
   told_oscillation_ = present.lasts;
 }
 
-// Warns on standard error if a force that no longer counts as a hand's is one that a person could feel.
+// Warns on standard error if the session takes the handle for empty although a force is measured that a person could
+// feel.
 void SessionOutput::say_belief(const CycleRecord& record) {
   const bool off = record.has(controller::RecordFlag::hands_off);
   const double force_N = controller::vec3(record.force_W_N).norm();
@@ -265,7 +270,8 @@ void SessionOutput::judge_pose(const CycleRecord& record) {
   say_poses();
 }
 
-// Reported on standard error, as only the start pose was judged at the start. A user who forced an unstable mass knows.
+// Reports on standard error the unstable places that the arm passed, because at the session's start only the start pose
+// was judged. With --force-unstable nothing is reported, because the user knows that the mass is unstable.
 void SessionOutput::say_poses() {
   for (const controller::UnstablePlaces& there : poses_->news()) {
     if (options_.force_unstable) continue;
@@ -285,7 +291,8 @@ CycleRecord SessionOutput::add(const CycleRecord& record) {
 }
 
 void SessionOutput::tell(const CycleRecord& record) {
-  // A hold for a change of the timestep ends by itself. If it doesn't, it is reported once the change is over.
+  // A hold that is needed to change the timestep isn't reported, because it ends by itself. If the hold goes on when
+  // the change is over, it is reported.
   if (record.phase != controller::Phase::holding || !record.has(controller::RecordFlag::timestep)) {
     if (record.phase != last_phase_) say_how_to_get_free(record.phase);
     last_phase_ = record.phase;
@@ -332,7 +339,7 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
 
 int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   progress_.clear();
-  // Faults that were reset come first.
+  // Faults that were reset come first in the list, so the last fault tells whether a fault ended the session.
   const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
   if (options_.view_place) {
     summary.view = {options_.view_place->port, options_.view_place->most_viewers, options_.view_control};
@@ -359,7 +366,7 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
 
 bool SessionOutput::draw_plot(const Summary& summary) {
   if (!plot_) return true;
-  if (plot_->is_empty()) {  // stopped before rendering; the user knows
+  if (plot_->is_empty()) {  // the session ended before rendering
     if (!options_.json) std::printf("  plot:                     none; nothing was rendered\n");
     return true;
   }

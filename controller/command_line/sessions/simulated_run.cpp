@@ -23,8 +23,8 @@ using controller::Cycle;
 using controller::CycleRecord;
 using SteadyClock = std::chrono::steady_clock;
 
-// Makes virtual time keep pace with the wall clock, for viewers: each cycle waits until it is due. No cycle is skipped,
-// and the setpoints are the same to the bit as without waiting.
+// Makes virtual time keep pace with the wall clock, for viewers: each cycle waits until its time has come on the wall
+// clock. No cycle is skipped, and the setpoints are equal to the bit to those of a run without waiting.
 class Spectator {
  public:
   explicit Spectator(bool looks) : looks_(looks) {}
@@ -43,9 +43,9 @@ class Spectator {
   SteadyClock::time_point begun_;
 };
 
-// Time for the last frames to reach the drives: the longest queue of a cycle takes a millisecond.
+// Time that the last frames have to reach the drives. The longest queue of a cycle takes a millisecond.
 constexpr std::int64_t last_words_ns = 5'000'000;
-constexpr std::size_t record_capacity = 64;  // drained after every cycle
+constexpr std::size_t record_capacity = 64;  // records are drained after every cycle
 
 sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
   sim::SimulatedCellConfig config;
@@ -112,7 +112,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
                                          }
                                        },
                                        [&] { drain(cycle.records()); }};
-  if (options_.pace == Pace::realtime) network_.follow_real_time();  // from now on: earlier time belongs to no cycle
+  if (options_.pace == Pace::realtime) network_.follow_real_time();  // from now on, because no cycle ran before
   const controller::SessionTally tally =
       controller::run_session(cycle, network_, session_length(session_, options_), hooks);
   if (exploded_at_ns_) controller::refuse_explosion(1e-9 * static_cast<double>(*exploded_at_ns_ - power_on_ns_));

@@ -1,4 +1,4 @@
-// `proxarm run --bus sim`: controller and simulated arm in one process, on in-process buses.
+// Runs `proxarm run --bus sim`: controller and simulated arm in one process, on in-process buses.
 #pragma once
 
 #include <optional>
@@ -19,7 +19,7 @@ class SimulatedRun {
   SimulatedRun(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
                BlackBoxKeeper& keeper);
 
-  // Returns the exit status; throws SetupError only while nothing has moved.
+  // Runs the session and returns the exit status. Throws SetupError only before the arm moves.
   int run();
 
  private:
@@ -37,7 +37,7 @@ class SimulatedRun {
   std::unique_ptr<RecordedMessages> messages_;
   std::optional<std::int64_t> exploded_at_ns_;  // when the simulated arm's motion became impossible
   std::int64_t power_on_ns_ = 0;
-  sim::Truth truth_;  // at the present cycle's SYNC
+  sim::Truth truth_;  // the simulation's truth at the present cycle's SYNC
 };
 
 }  // namespace proxarm::command_line
