@@ -25,7 +25,6 @@
 // 6. If a frame comes after another frame, its release time and J depend on the other frame's bound. So all bounds are
 //    increased together until no bound changes.
 // A test checks that no run of the in-process bus exceeds these bounds.
-// test checks that no run of the in-process bus exceeds these bounds.
 #pragma once
 
 #include <cstdint>
@@ -46,8 +45,7 @@ struct PlannedFrame {
   // The frame is queued between delay_ns and latest_delay_ns after its release. Its release is `release`, or the
   // arrival of the frame `after` if `after` isn't empty. Frames that are queued at the same time leave in the order of
   // the list.
-  // Fraction of the period after the cycle's start.
-  double release = 0.0;
+  double release = 0.0;  // fraction of the period after the cycle's start
   std::string after{};
   std::int64_t delay_ns = 0;
   std::int64_t latest_delay_ns = 0;  // if below delay_ns, delay_ns is used
