@@ -10,8 +10,8 @@
 //   080 + node: code u16, error register u8, 5 bytes that the maker defines   EMCY
 //   580 + node                    SDO answers
 //   600 + node                    SDO requests
-//   700 + node, remote request    node guarding; the device answers while 1017h is 0, with its state and a toggling bit
-//   7 700 + node: state             boot-up 00; heartbeat 04 stopped, 05 operational, 7F pre-operational
+//   700 + node, remote request    node guarding; while 1017h is 0, the answer is the state with a toggling bit 7
+//   700 + node: state             boot-up 00; heartbeat 04 stopped, 05 operational, 7F pre-operational
 #pragma once
 
 #include <array>
