@@ -253,7 +253,8 @@ class Analysis {
   // Examines all busy periods that can contain m:
   // 1. A busy period begins with the release of one of its frames.
   // 2. Of two busy periods with the same frames, the one that begins later also ends later.
-  // 3. So it is enough to try the latest release times of m and of the competitors (`lasts`) as beginnings.
+  // 3. So among the busy periods with the same frames, only the latest beginning matters. The latest possible
+  //    beginnings are the latest release times of m and of the competitors (`lasts`), and only these are tried.
   void examine_in_step(std::size_t m, const Level& level) {
     const FrameWindow own = windows_[m];
     const std::int64_t latest_ns = own.release_ns + own.jitter_ns;

@@ -80,8 +80,8 @@ class CyclicDrive {
 
   // Archives all state that changes in a cycle.
   virtual void archive(StateArchive& state) noexcept = 0;
-  // Archives the input that the last on_sync() got otherwise than by frames. When the archive is read back, the next
-  // on_sync() gets this input.
+  // Archives the input that the last on_sync() got from other sources than frames. When the archive is read back, the
+  // next on_sync() gets this input.
   virtual void archive_input(StateArchive& /*state*/) noexcept {}
 
  protected:

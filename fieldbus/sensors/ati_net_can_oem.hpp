@@ -25,7 +25,6 @@
 // - frames of wrong length
 // A sample is late if it answers the poll before the last one but was received after the last one. A late sample is
 // used until the answer to the last poll comes.
-// last poll's answer comes.
 #pragma once
 
 #include <array>

@@ -76,7 +76,7 @@ class ForceSensor {
   [[nodiscard]] virtual const ForceSample& latest() const noexcept = 0;
   // Archives the values read at start and all state that changes in a cycle.
   virtual void archive(StateArchive& state) noexcept = 0;
-  // Archives the input that this cycle got otherwise than by CAN frames. When the archive is read, this input is
+  // Archives the input that this cycle got from other sources than CAN frames. When the archive is read, this input is
   // restored before the cycle.
   virtual void archive_input(StateArchive& /*state*/) noexcept {}
 

@@ -9,7 +9,6 @@
 // computing takes no virtual time. A run depends on its input alone, so two runs are identical. Memory is allocated
 // only until each identifier has been seen and the event queue has reached its largest size. Only one thread may use a
 // network. All nodes must be attached before apply() and before the first wait.
-// before apply() and before the first wait.
 #pragma once
 
 #include <cstddef>

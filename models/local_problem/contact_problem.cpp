@@ -38,10 +38,10 @@ inline Projected project(const Vec3& z, double mu) noexcept {
 
 // How many times stiffer than the coupling the contacts are in Newton's method. In each step the error of the
 // multipliers falls by the factor 1/(1 + kStiff λ), where λ is the smallest eigenvalue of the scaled W = H Hᵀ that
-// isn't 0. Above 1e9, rounding of kStiff u would change the states.
+// isn't 0. With kStiff above 1e9, rounding of kStiff u would change the states.
 constexpr double kStiff = 1e7;
-// Tolerance of a solution, as a share of the force with which the free motion would press. It is about a hundred
-// roundings of sums over rows.
+// Tolerance of a solution, as a share of the force that make_rows() returns. It is about a hundred roundings of sums
+// over rows.
 constexpr double kTolerance = 1e-12;
 // Tolerance after kQuiet steps. If contacts hold each other (along an edge, on a face), rounding of the stiff contacts
 // moves a slip that is nearly zero, so the law is obeyed only to about 1e-11. The tolerance is 1e-9 N of 10 N.
@@ -82,9 +82,9 @@ Twist ContactProblem::yield_to(const Twist& wrench) const noexcept {
   return L_inverse_.transpose() * (L_inverse_ * wrench);
 }
 
-// Fills rows_. Returns the force to which tolerances refer: the force with which the free motion would press, or the
-// share kMissed of the force that closes the most negative gap, whichever is larger. The second force is needed because
-// a pose of the iteration may be p̂ itself; the free motion then presses with nothing.
+// Fills rows_. Returns the force to which tolerances refer: the force that the free motion would exert, or the share
+// kMissed of the force that closes the most negative gap, whichever is larger. The second force is needed because a
+// pose of the iteration may be p̂ itself; the free motion then exerts no force.
 double ContactProblem::make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept {
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const LinearContact& contact = contacts[i];
@@ -364,7 +364,8 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
     if (attempt == 0) {
       for (Row& row : rows) row.f.setZero();
     }
-    if (attempt == 1 && !slippery) {  // the first sweeps solve most problems, at lower cost
+    // the sweeps of attempt 0 solve most problems, and cost less than by_more_friction()
+    if (attempt == 1 && !slippery) {
       const Iterate swept = kept(rows, y);
       solved = by_more_friction(rows, y, size);
       if (solved) break;

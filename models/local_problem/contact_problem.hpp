@@ -54,8 +54,8 @@ class ContactProblem {
 
   // Finds δ, and f and state of each contact. False if no solution was found; δ is then the last result of the
   // Gauss-Seidel sweeps, which keeps gaps only as far as the sweeps have converged. `rough` is the violation of the law
-  // that may remain, as a share of the force with which the free motion would press, if the problem will be posed again
-  // from this solution; 0: only rounding may remain. Precondition: at most `most` contacts.
+  // that may remain, as a share of the force that the free motion would exert, if the problem will be posed again from
+  // this solution; 0: only rounding may remain. Precondition: at most `most` contacts.
   bool solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta, double rough = 0.0) noexcept;
 
   // True if the contacts' given forces obey the law to within rounding. δ is then the twist to which these forces lead,

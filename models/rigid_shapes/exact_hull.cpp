@@ -10,8 +10,8 @@
 namespace proxarm::models {
 namespace {
 
-// Gift wrapping: goes from each face over its edges to the next faces. Seen along an edge of the hull, all points are
-// within half a turn, so they can be ordered by how far out they are.
+// Computes the hull by gift wrapping: from each face, it goes over the face's edges to the neighbouring faces. Seen
+// along an edge of the hull, all points are within half a turn, so they can be ordered by how far out they are.
 class Wrapping {
  public:
   explicit Wrapping(const std::vector<Vec3>& points) : points_(points) {}

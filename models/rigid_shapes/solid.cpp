@@ -44,7 +44,8 @@ Solid finished(Solid solid) {
   return solid;
 }
 
-// Gift wrapping: goes from each face over its edges to the next faces, until each edge has two faces.
+// Computes the hull by gift wrapping: from each face, it goes over the face's edges to the neighbouring faces, until
+// each edge has two faces.
 class Hull {
  public:
   explicit Hull(std::vector<Vec3> points) : points_(std::move(points)) {
@@ -93,7 +94,7 @@ class Hull {
   // Turns the plane through the point `at` with normal n about an axis in the plane, until the plane meets the next
   // points. Returns the new normal.
   Vec3 tilted(std::uint32_t at, const Vec3& axis, const Vec3& n) const {
-    // in the plane, perpendicular to the axis: on this side the plane turns towards the points
+    // direction in the plane, perpendicular to the axis; on this side of the axis the plane turns towards the points
     const Vec3 away = n.cross(axis);
     double least = std::numeric_limits<double>::infinity();
     for (const Vec3& p : points_) {

@@ -132,7 +132,8 @@ bool ModbusDevice::store(unsigned at, unsigned count, std::span<const std::uint8
   return true;
 }
 
-// Notes a command when its last register is written: a drive with a trigger has the trigger there.
+// Notes a command when the last register of the command is written. If a drive starts a motion only by a trigger, its
+// trigger is in that register.
 void ModbusDevice::note_command(unsigned at, unsigned count) noexcept {
   const unsigned last = registers_.command_register + static_cast<unsigned>(registers_.command_count()) - 1;
   if (at <= last && at + count > last) commanded_ = true;

@@ -79,8 +79,8 @@ class Plant {
   [[nodiscard]] bool hand_started() const noexcept { return hand_started_; }
   [[nodiscard]] std::int64_t hand_start_ns() const noexcept { return hand_start_ns_; }
 
-  // Switches a servo off as a drive does that controls its brake. If the servo's setpoint rests, the servo holds the
-  // axis until the brake has closed; else its torque ends at once. Enabling the servo cancels this.
+  // Switches a servo off in the same way as a drive that controls its brake. If the servo's setpoint rests, the servo
+  // holds the axis until the brake has closed; else its torque ends at once. Enabling the servo cancels this.
   void switch_off(std::size_t axis) noexcept;
 
   // Puts a body in the way of the tool from now on.
