@@ -80,7 +80,7 @@ void check_pairs(const PlannedBus& bus) {
       if (one.name == two.name) refuse(bus, two, "two frames have this name");
       if (one.id != two.id || one.shape.extended != two.shape.extended) continue;
       if (two.after == one.name || one.after == two.name) continue;  // an answer may use its question's identifier
-      // one sender, and the frames are never pending at the same time
+      // One sender, and the frames are never pending at the same time.
       if (!two.sender.empty() && two.sender == one.sender && !two.after.empty()) continue;
       refuse(bus, two, "has the same identifier as \"" + one.name + "\"; give one of them another");
     }

@@ -77,7 +77,7 @@ struct FramePlan {
   bool extended = false;
   std::int64_t wire_ns = 0;      // the frame's longest time on the wire
   std::int64_t response_ns = 0;  // worst case, from queuing to the end of the frame
-  // worst case, from the cycle's start to the end of the frame; with any_time it equals response_ns
+  // Worst case, from the cycle's start to the end of the frame; with any_time it equals response_ns.
   std::int64_t finish_ns = 0;
   std::int64_t deadline_ns = 0;
   // false: the frame can wait longer than its repetition time, and response_ns and finish_ns are meaningless.

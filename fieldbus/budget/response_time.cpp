@@ -23,7 +23,7 @@ struct Competitor {
   bool not_this_cycle = false;
   // The frame can stand in its sender's queue behind a frame with lower priority than `weakest`.
   bool held_back = false;
-  // jitter of the frame's release, or of the time when it reaches the head of its queue if held_back
+  // Jitter of the frame's release, or of the time when it reaches the head of its queue if held_back.
   std::int64_t jitter_ns = 0;
 };
 

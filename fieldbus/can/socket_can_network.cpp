@@ -181,7 +181,7 @@ class SocketCanNetwork::Bus final : public CanBus {
   std::array<mmsghdr, batch_size> headers_{};
   std::array<iovec, batch_size> vectors_{};
   std::array<Message, batch_size> messages_{};
-  // decoded frames; frames in [next_, count_) are still to be returned by receive()
+  // Decoded frames; frames in [next_, count_) are still to be returned by receive().
   std::array<TimedFrame, batch_size> frames_{};
   std::size_t next_ = 0;
   std::size_t count_ = 0;
@@ -334,7 +334,7 @@ std::int64_t SocketCanNetwork::Bus::read_control(std::size_t i) noexcept {
     } else if (control->cmsg_type == SO_RXQ_OVFL) {
       std::uint32_t dropped = 0;
       std::memcpy(&dropped, CMSG_DATA(control), sizeof dropped);
-      // unsigned difference, because the kernel's 32-bit counter may wrap
+      // Unsigned difference, because the kernel's 32-bit counter may wrap.
       status_.receive_overflows += dropped - dropped_;
       dropped_ = dropped;
     }

@@ -34,7 +34,7 @@ enum class Listening : std::uint8_t {
 
 struct BusToLead {
   std::size_t bus = 0;
-  // nodes to be led; if empty, only SYNC, NMT commands and the controller's heartbeat are signs
+  // Nodes to be led; if empty, only SYNC, NMT commands and the controller's heartbeat are signs.
   std::vector<std::uint8_t> nodes{};
   std::uint8_t master_node = 0;  // node number in the controller's heartbeat; 0: heartbeats are no sign
 };

@@ -41,7 +41,7 @@ struct DriveSettings {
   std::uint16_t master_heartbeat_ms = 20;          // period of the heartbeat that the cycle sends
   std::uint16_t master_heartbeat_timeout_ms = 60;  // 1016h:01; after this time without the heartbeat the drives stop
   std::uint16_t drive_heartbeat_ms = 50;           // 1017h: period of the drives' heartbeats
-  // time without a drive's heartbeat after which the master reports heartbeat_lost
+  // Time without a drive's heartbeat after which the master reports heartbeat_lost.
   std::uint16_t drive_heartbeat_timeout_ms = 150;
   // false: the drives' heartbeats end with the set-up. The TPDO at every SYNC then shows that a drive is alive; it
   // comes fifty times as often as the heartbeat, and it also ends when the drive leaves NMT operational. Heartbeats of

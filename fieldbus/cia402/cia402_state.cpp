@@ -37,7 +37,7 @@ constexpr TransitionRow transition_rows[] = {
     {DriveGoal::switched_off, DriveState::operation_enabled, {cw::shutdown, 8}},
     {DriveGoal::switched_off, DriveState::switched_on, {cw::shutdown, 6}},
     {DriveGoal::switched_off, DriveState::ready_to_switch_on, {cw::disable_voltage, 7}},
-    // until the ramp of the quick stop ends
+    // Until the ramp of the quick stop ends.
     {DriveGoal::switched_off, DriveState::quick_stop_active, {cw::quick_stop, -1}},
 
     {DriveGoal::quick_stop, DriveState::operation_enabled, {cw::quick_stop, 11}},

@@ -24,7 +24,7 @@ enum class DriveFault : std::uint8_t {
   emergency,       // the drive sent an EMCY that isn't a warning (canopen_emcy.hpp)
   heartbeat_lost,  // the drive sent no heartbeat for drive_heartbeat_timeout_ms
   restarted,       // the drive sent a boot-up message: it was reset and has lost its configuration
-  // the drive's heartbeat shows another NMT state than operational, for example after an NMT command of another node
+  // The drive's heartbeat shows another NMT state than operational, for example after an NMT command of another node.
   not_operational,
   pdo_short,            // a TPDO was shorter than its mapping
   not_remote,           // statusword bit 9 is 0 in operation: the drive is under local control

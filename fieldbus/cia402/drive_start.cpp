@@ -13,7 +13,7 @@ using Slots = std::span<const DriveSlot>;
 // Times after which a drive counts as not started: after the first NMT start, and after each remedy. Drives report
 // their state every 50 ms (1017h), so these times contain enough heartbeats.
 constexpr std::int64_t looked_into_after_ns = 300'000'000, shows_within_ns = 200'000'000;
-// how long the controller shows signs of life before NMT start: five heartbeats
+// How long the controller shows signs of life before NMT start: five heartbeats.
 constexpr std::int64_t signs_of_life_ns = 100'000'000;
 
 constexpr const char* how_to_start =

@@ -73,7 +73,7 @@ class AtiNetCanOem final : public ForceSensor {
   [[nodiscard]] const Gauges& gauges() const noexcept { return gauges_; }  // the gauges of the latest sample
   [[nodiscard]] std::uint64_t late_samples() const noexcept { return late_; }
   [[nodiscard]] std::uint64_t incomplete_samples() const noexcept { return incomplete_; }
-  // frames that were late, repeated or out of order
+  // Frames that were late, repeated or out of order.
   [[nodiscard]] std::uint64_t dropped_frames() const noexcept { return dropped_; }
   [[nodiscard]] std::uint64_t wrong_lengths() const noexcept { return wrong_lengths_; }
 

@@ -68,7 +68,7 @@ struct WireFrame {
   std::int64_t end_ns;  // end of the frame, when it is received
   std::size_t bus;
   std::string_view bus_name;
-  // name of the sender's port, such as "controller"; empty if the sender went off during the frame
+  // Name of the sender's port, such as "controller"; empty if the sender went off during the frame.
   std::string_view sender;
   bool lost;  // true: a fault rule dropped or destroyed the frame
 };

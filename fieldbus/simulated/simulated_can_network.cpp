@@ -73,7 +73,7 @@ std::int64_t monotonic_ns() noexcept {
 void SimulatedCanNetwork::follow_real_time() {
   real_time_ = true;
   real_time_offset_ns_ = monotonic_ns() - now_ns();
-  // the largest value, so that the first lateness doesn't count as a gap
+  // The largest value, so that the first lateness doesn't count as a gap.
   woken_late_ns_ = std::numeric_limits<std::int64_t>::max();
 }
 

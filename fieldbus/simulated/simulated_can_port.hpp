@@ -52,7 +52,7 @@ class SimulatedCanBus::Port final : public CanPort {
   }
   [[nodiscard]] const Queued& head() const noexcept { return queue_.front(); }
   [[nodiscard]] std::size_t queue_size() const noexcept { return queue_.size(); }
-  // key of the head frame; no_frame: the queue is empty
+  // Key of the head frame; no_frame: the queue is empty.
   [[nodiscard]] std::uint64_t key() const noexcept { return key_; }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] CanListener* listener() const noexcept { return listener_; }

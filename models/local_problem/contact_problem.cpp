@@ -364,7 +364,7 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
     if (attempt == 0) {
       for (Row& row : rows) row.f.setZero();
     }
-    // the sweeps of attempt 0 solve most problems, and cost less than by_more_friction()
+    // The sweeps of attempt 0 solve most problems, and cost less than by_more_friction().
     if (attempt == 1 && !slippery) {
       const Iterate swept = kept(rows, y);
       solved = by_more_friction(rows, y, size);

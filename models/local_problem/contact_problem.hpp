@@ -36,7 +36,7 @@ namespace proxarm::models {
 enum class ContactState : std::uint8_t { open, stick, slip };
 
 struct LinearContact {
-  // rows: normal, two tangents; maps a twist at the reference point to displacements of the contact
+  // Rows: normal, two tangents; maps a twist at the reference point to displacements of the contact.
   Eigen::Matrix<double, 3, 6> J;
   Vec3 c = Vec3::Zero();  // gap, and slip along the tangents, at δ = 0; m
   double mu = 0.0;

@@ -151,7 +151,7 @@ std::optional<Meeting> meet_side(const Cylinder& cylinder, const EdgeLine& edge,
 std::optional<Meeting> meet_end(const Cylinder& cylinder, std::uint32_t end, const Vec3& p, double radius,
                                 double beside) noexcept {
   const double height = cylinder.before_end(end, p);
-  // the centre of the ball is behind the end's plane: beside the side, or before the other end
+  // The centre of the ball is behind the end's plane: beside the side, or before the other end.
   if (radius > 0.0 && height < -beside) return {};
   const Vec3 out = cylinder.out_of_end(end), foot = p - height * out;
   if ((foot - cylinder.rims[end].centre).norm() > cylinder.radius + beside) return {};

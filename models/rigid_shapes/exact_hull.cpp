@@ -32,7 +32,7 @@ class Wrapping {
 
  private:
   struct Plane {
-    // no point is in front of the plane; from and to are the ends of an edge of its face
+    // No point is in front of the plane; from and to are the ends of an edge of its face.
     std::uint32_t from = 0, to = 0, third = 0;
   };
 

@@ -94,7 +94,7 @@ class Hull {
   // Turns the plane through the point `at` with normal n about an axis in the plane, until the plane meets the next
   // points. Returns the new normal.
   Vec3 tilted(std::uint32_t at, const Vec3& axis, const Vec3& n) const {
-    // direction in the plane, perpendicular to the axis; on this side of the axis the plane turns towards the points
+    // Direction in the plane, perpendicular to the axis; on this side of the axis the plane turns towards the points.
     const Vec3 away = n.cross(axis);
     double least = std::numeric_limits<double>::infinity();
     for (const Vec3& p : points_) {

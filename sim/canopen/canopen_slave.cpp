@@ -42,7 +42,7 @@ void CanopenSlave::add_communication_objects() {
   for (std::uint8_t i = 1; i <= 8; ++i) od.add(0x1003, i, unsigned32, read_only, 0);
   sync_id_ = &od.add(0x1005, 0, unsigned32, read_write, 0x80);
   sync_id_->before_write = [](std::int64_t value) {
-    // bit 30 must be 0: the device doesn't generate SYNC
+    // Bit 30 must be 0: the device doesn't generate SYNC.
     return (value & ~0x7FF) == 0 ? SdoAbort::none : SdoAbort::invalid_value;
   };
   od.add(0x1006, 0, unsigned32, read_write, 0);

@@ -197,7 +197,7 @@ class CanopenSlave final : public BusDevice {
   bool life_lost_ = false;
   SlaveQuirks quirks_;
   std::uint32_t syncs_ = 0;  // number of SYNCs since power on
-  // toggle bit of the next answer to node guarding or, with toggles_heartbeat, of the next heartbeat
+  // Toggle bit of the next answer to node guarding or, with toggles_heartbeat, of the next heartbeat.
   bool toggle_ = false;
 };
 

@@ -85,7 +85,7 @@ SdoAbort SlavePdo::resolve(std::uint32_t object, Mapped& mapped) const noexcept 
   const auto index = static_cast<std::uint16_t>(object >> 16);
   const auto subindex = static_cast<std::uint8_t>(object >> 8);
   const std::uint32_t bits = object & 0xFF;
-  // a dummy entry: its bytes in the PDO are skipped
+  // A dummy entry: its bytes in the PDO are skipped.
   if (direction_ == Direction::receive && index >= 1 && index <= 7 && subindex == 0) {
     const std::size_t size = size_of(static_cast<DataType>(index));
     if (bits != 8 * size) return SdoAbort::object_cannot_be_mapped;

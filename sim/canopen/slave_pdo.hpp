@@ -42,7 +42,7 @@ class SlavePdo {
   [[nodiscard]] bool synchronous() const noexcept { return type_ <= 240; }
   [[nodiscard]] std::int64_t inhibit_ns() const noexcept { return inhibit_ns_; }
   [[nodiscard]] std::int64_t event_timer_ns() const noexcept { return event_timer_ns_; }
-  // number of mapped bytes, 0..8, with CAN FD 0..64
+  // Number of mapped bytes, 0..8, with CAN FD 0..64.
   [[nodiscard]] std::uint8_t length() const noexcept { return length_; }
 
   // Writes the PDO's data to the mapped objects. Precondition: `bytes` has at least length() bytes.

@@ -141,7 +141,7 @@ class SimulatedCell final : private Clockwork {
   std::vector<std::size_t> node_of_axis_;
   std::unique_ptr<PlantWrench> wrench_;
   std::unique_ptr<AtiDevice> sensor_;  // nullptr: described_sensor_ is used
-  // registers of described_sensor_ if it is on Modbus, else nullptr
+  // Registers of described_sensor_ if it is on Modbus, else nullptr.
   std::unique_ptr<ModbusSensorDevice> sensor_registers_;
   std::unique_ptr<DescribedDevice> described_sensor_;
   std::unique_ptr<EnablingSwitch> enabling_;

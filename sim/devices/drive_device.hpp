@@ -74,7 +74,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
 
   [[nodiscard]] DriveState state() const noexcept { return state_; }
   [[nodiscard]] std::uint16_t statusword() const noexcept;
-  // the number of the transition in CiA 402
+  // The number of the transition in CiA 402.
   [[nodiscard]] int last_transition() const noexcept { return last_transition_; }
   [[nodiscard]] CanopenSlave& canopen() noexcept { return slave_; }
   [[nodiscard]] const CanopenSlave& canopen() const noexcept { return slave_; }

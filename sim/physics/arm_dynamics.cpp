@@ -126,7 +126,7 @@ void ArmDynamics::reset(std::span<const double> joint_rad) {
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     Axis& axis = axes_[i];
     if (!(axis.stiffness_Nm_per_rad > 0.0)) {
-      // the diagonal element of M comes first in its row
+      // The diagonal element of M comes first in its row.
       const double inertia = l.data->qM[l.model->dof_Madr[axis.dof]];
       axis.stiffness_Nm_per_rad = inertia * rigid_gear_rad_per_s * rigid_gear_rad_per_s;
       axis.damping_Nms_per_rad = 0.1 * inertia * rigid_gear_rad_per_s;

@@ -12,7 +12,8 @@ using models::Vec3;
 
 namespace {
 
-// below this angle, the first term of each series below is used; the next term is smaller by a factor of small_rad²/20
+// Below this angle, only the first term of each series below is used. The next term is smaller by a factor of
+// small_rad²/20.
 constexpr double small_rad = 1e-4;
 
 // Returns ω of R = exp([φ]ₓ):  ω = φ̇ + (1 − cos θ)/θ² φ × φ̇ + (θ − sin θ)/θ³ φ × (φ × φ̇), θ = |φ|
