@@ -17,7 +17,7 @@ using description::in_quotes;
 using description::SetupError;
 
 constexpr std::string_view digits = "0123456789ABCDEF";
-constexpr std::uint32_t error_flag = 0x20000000;  // in the identifier of an error frame, as in SocketCAN
+constexpr std::uint32_t error_flag = 0x20000000;  // set in the identifier of an error frame, as in SocketCAN
 constexpr unsigned switch_flag = 1;               // CANFD_BRS
 constexpr std::size_t longest_line = 4096;        // a longer line is rejected without parsing
 

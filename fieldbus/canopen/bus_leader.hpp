@@ -54,7 +54,7 @@ class LeaderWatch {
  private:
   BusToLead bus_;
   Listening listening_;
-  std::map<std::uint32_t, std::uint64_t> counts_;  // by identifier
+  std::map<std::uint32_t, std::uint64_t> counts_;  // number of frames by identifier
 };
 
 // Listens for `time_ns` without sending. Throws SetupError if another controller leads one of the buses. `other` also

@@ -36,7 +36,7 @@ namespace proxarm::fieldbus {
 
 // Settings that all drives of a session share. Times that are sent to drives in milliseconds are in milliseconds here.
 struct DriveSettings {
-  std::int64_t period_ns = 1'000'000;              // of SYNC; 60C2h and 1006h must be able to hold it exactly
+  std::int64_t period_ns = 1'000'000;              // period of SYNC; 60C2h and 1006h must be able to hold it exactly
   std::uint8_t master_node = 127;                  // node whose heartbeat the drives watch
   std::uint16_t master_heartbeat_ms = 20;          // period of the heartbeat that the cycle sends
   std::uint16_t master_heartbeat_timeout_ms = 60;  // 1016h:01; after this time without the heartbeat the drives stop

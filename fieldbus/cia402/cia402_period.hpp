@@ -57,7 +57,7 @@ class PeriodExchange {
   void archive(StateArchive& state) noexcept;
 
  private:
-  static constexpr std::uint8_t attempts = 2;  // per request, so that one lost frame doesn't make the exchange fail
+  static constexpr std::uint8_t attempts = 2;  // attempts per request; one lost frame doesn't make the exchange fail
 
   enum class Waiting : std::uint8_t { nothing, write, read };
   struct Node {

@@ -50,7 +50,7 @@ inline constexpr std::uint16_t voltage_enabled = 1U << 4;
 inline constexpr std::uint16_t warning = 1U << 7;
 inline constexpr std::uint16_t remote = 1U << 9;  // 0: the drive ignores the controlword
 inline constexpr std::uint16_t internal_limit_active = 1U << 11;
-inline constexpr std::uint16_t follows_command = 1U << 12;  // in cyclic modes: the drive follows targets
+inline constexpr std::uint16_t follows_command = 1U << 12;  // 1, in cyclic modes: the drive follows targets
 inline constexpr std::uint16_t following_error = 1U << 13;  // in cyclic modes
 }  // namespace statusword
 

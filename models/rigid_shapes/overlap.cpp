@@ -43,7 +43,8 @@ bool seek_plane(Vec3 n, std::span<const Vec3> a, std::span<const Vec3> b, Try tr
   return false;
 }
 
-// Returns the gap between a body and the points b, along n. Precondition: the body reaches `own` along n.
+// Returns the gap between a body and the points b, along n. Precondition: `own` is the largest nᵀp of the body's points
+// p.
 double gap_beyond(double own, const Vec3& n, std::span<const Vec3> b) noexcept { return -furthest(-n, b) - own; }
 
 // True if a plane with the normal n may lie on a convex body along one of its edges, that is, if n lies between the

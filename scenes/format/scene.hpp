@@ -70,8 +70,8 @@ struct MeshShape {
   models::Pose pose_W = models::Pose::Identity();    // as described: pose of the file's origin, or of the `anchor`
   std::optional<double> weld_m;                      // see MeshPlacement::weld_m
   double close_holes_m = 0.0;                        // holes up to this size are closed; 0: no hole is closed
-  bool inside_out = false;                           // of a closed mesh: the inside is free
-  std::shared_ptr<const models::TriangleMesh> mesh;  // in W
+  bool inside_out = false;                           // true: the inside of a closed mesh is free
+  std::shared_ptr<const models::TriangleMesh> mesh;  // the mesh in W
   FaceAccount account;                               // counts how the file's faces were used
 };
 

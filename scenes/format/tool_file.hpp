@@ -15,7 +15,7 @@ class YamlNode;
 namespace proxarm::scenes {
 
 struct RigidTool {
-  std::filesystem::path file;  // for messages
+  std::filesystem::path file;  // file for messages
   int line = 0;
   std::string name;
   models::Tool shape;                         // has at least one part

@@ -25,7 +25,7 @@ struct KindName {
   DeviceFaultKind kind;
   // Maximum of the fault's VALUE; `none`: the fault has no VALUE.
   std::uint64_t most;
-  ParseAmount parse_amount = nullptr;  // for a fault that has an AMOUNT instead of a VALUE
+  ParseAmount parse_amount = nullptr;  // parses the AMOUNT of a fault that has one instead of a VALUE
   bool is_signed = false;
 };
 

@@ -151,7 +151,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   std::int64_t zero_counts_ = 0;  // position of the axis at the drive's zero
   // Stand-ins for 2001h and 2010h:01 in a drive with its maker's dictionary.
   std::array<ObjectEntry, 2> unlisted_{};
-  std::int64_t period_ns_ = 0;  // from 60C2h; 0: not set
+  std::int64_t period_ns_ = 0;  // period in 60C2h; 0: 60C2h isn't set
 
   // Dictionary entries that are used in every cycle.
   ObjectEntry *controlword_ = nullptr, *statusword_ = nullptr, *target_ = nullptr, *position_ = nullptr,
