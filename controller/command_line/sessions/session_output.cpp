@@ -10,6 +10,7 @@
 #include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/command_line/sessions/view_process.hpp"
 #include "controller/library/session_summary.hpp"
 #include "controller/report/terminal.hpp"
