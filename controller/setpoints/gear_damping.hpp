@@ -4,8 +4,8 @@
 // gear's stiffness. θ: the motor's angle. With M φ̈ = τ and θ̇ = −(κ/k) τ, the gear's torque τ follows
 //   τ̈ + κ τ̇ + ω² τ = 0,   ω² = k/M
 // The motor shouldn't yield to the torques of the setpoints' acceleration, the arm's weight and the hand. So these
-// torques are removed from the measured τ: τ̂ = M q̈_f + τ_g of the setpoints that the gear follows now, and −Jᵀh, which
-// the hand's force h (by the sensor) adds to τ. A setpoint changes by
+// torques are removed from the measured τ: τ̂ = M q̈_f + τ_g of the setpoints that the gear follows now, and −Jᵀh,
+// which the hand's force h (by the sensor) adds to τ. A setpoint changes by
 //   θ −= (κ/k) y,   y = s/(s + a)² (τ + Jᵀh − τ̂)
 // The filter integrates above a/2π = 6.4 Hz and forgets below it. So a sensor's offset moves nothing, and a reading
 // error τ_e moves a motor by at most κ τ_e/(k a e). Without Jᵀh a motor also yields to the hand: a felt mass of 10 kg
