@@ -38,7 +38,7 @@ void PointTool::set(const Change& change) noexcept {
   if (change.parameter == Parameter::turning_spring) orientation_.set_spring(change.value);
 }
 
-// If no inertia was specified, the tool's isn't subtracted.
+// If the session has no inertia setting, the tool's inertia isn't subtracted.
 void PointTool::hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept {
   world_->set({.parameter = Parameter::mass, .value = proxy_mass_kg});
   behind_sensor_T_ = behind.about_T_kg_m2;
