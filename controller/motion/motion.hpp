@@ -5,9 +5,10 @@
 //                      gears, guards of joints and tool.
 //   TorqueMotion       Makes joint torques from the tool's position: (23).
 //
-// After begin_cycle(), the caller calls one more function of "each cycle" in each cycle; the session's phase decides
-// which. The caller calls functions of "between" at the start of a phase or on request. All functions are noexcept; no
-// function allocates, locks or prints.
+// In each cycle, after begin_cycle(), the caller calls the function of "each cycle" that belongs to the session's
+// phase. If the phase changes before the setpoints are made, the caller then calls the new phase's function. The caller
+// calls functions of "between" at the start of a phase or on request. All functions are noexcept; no function
+// allocates, locks or prints.
 #pragma once
 
 #include <cstdint>
