@@ -23,8 +23,8 @@ constexpr double acceleration_share = 1.0, braking_share = 0.5, eased_share = 0.
 // Share of the elbow's speed limit that a step may use. Gears add some 7 % when a hand pulls the arm along at the
 // limit.
 constexpr double elbow_share = 0.9;
-// Cost of a joint's step, added to the cost of turning: (joint speed / its limit)² counts as joint_cost (rad/s)². This
-// cost damps turning near a wrist singularity, below a singular value of 0.03 rad/rad.
+// Cost of a joint's step, added to the cost of turning: (joint speed / speed limit)² counts as joint_cost (rad/s)².
+// This cost damps turning near a wrist singularity, below a singular value of 0.03 rad/rad.
 constexpr double joint_cost = 1e-3;
 // Arms with fewer than six axes turn the tool as little as possible: 1 rad of turning costs as much as 10 rad of a
 // joint, as in prioritized_step.hpp.

@@ -16,10 +16,10 @@
 // The arm approaches the borders of place and turn no faster than its joints can brake. All sets but the box are
 // curved; for each curved set that a solution has left, a half-space is added.
 //
-// Position has priority over orientation. Near a wrist singularity, joints that can't turn the tool fast enough turn it
-// later; the sets of turning bound this lag. But the tool isn't tilted to reach further: if the joints that carry the
-// wrist can't move further, the position gives way. So the places that the arm can reach (FollowableStep) are the
-// places to which these joints can carry the wrist, with the tool in its wanted orientation or, if the tool turns
+// Position has priority over orientation. Near a wrist singularity, joints that can't turn the tool fast enough turn
+// the tool later; the sets of turning bound this lag. But the tool isn't tilted to reach further: if the joints that
+// carry the wrist can't move further, the position gives way. So the places that the arm can reach (FollowableStep) are
+// the places to which these joints can carry the wrist, with the tool in its wanted orientation or, if the tool turns
 // freely, in the orientation after braking. The proxy's next place is one of them, so the arm is sent to q(k).
 //
 // Each half-space is widened to what the joints can still do, so a single half-space never makes U empty. If several
@@ -55,7 +55,7 @@ struct ArmStepStart {
   // Speed limits: tool_m_per_s of T, elbow_m_per_s of elbow and wrist.
   double tool_m_per_s = 0.5, elbow_m_per_s = 0.5;
   Eigen::Quaterniond R_WT = Eigen::Quaterniond::Identity();  // the wanted orientation
-  bool held = true;              // the wanted orientation is constant, and the tool catches up slowly if it lags
+  bool held = true;              // the wanted orientation is constant, and a tool that lags turns to it slowly
   bool touches_turning = false;  // contacts of a tool with a shape may change its turning at once
   TurnSets turn{};
 };
@@ -174,12 +174,12 @@ class ArmStep final : public FollowableStep {
   // The history from step to step.
   models::JointVector link_rad_, step_rad_;
   bool lags_ = false;
-  double catching_rad_per_s_ = 0.0;  // speed at which a held orientation catches up
+  double catching_rad_per_s_ = 0.0;  // speed at which the tool turns back to a held orientation
 
   // Values of this step only.
   ArmStepStart start_;
   models::JointVector brakes_;  // the braking step u_b: all joints brake together, the slowest at half its acceleration
-  Box whole_, box_;             // whole_: U's box. box_: the part of it that is in use
+  Box whole_, box_;             // whole_: U's box. box_: the part of U's box that is in use
   bool eases_ = false;          // eases(): a small part of U's box is tried first
   double ease_ = 0.0;           // allowed change of a joint's step in box_, in halves of the joint's acceleration
   models::ToolKinematics from_;  // kinematics at c(k−1)

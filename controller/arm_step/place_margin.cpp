@@ -18,10 +18,10 @@ constexpr double least_m_per_rad = 0.05, share_of_start = 0.5;
 // the border.
 constexpr double near_m_per_rad = 0.1;
 // Change of an angle for finite differences of J_w. J_w is exact to 1e-16 m, so truncation and rounding each change
-// ∂J_w/∂c by a share of 1e-6.
+// ∂J_w/∂c by a millionth.
 constexpr double nudge_rad = 1e-6;
-// Axes count as meeting in the wrist if they pass it within this distance. The rounding of a right angle in a URDF
-// moves it by 1e-9 rad.
+// Axes count as meeting in the wrist if they pass it within this distance. A right angle is rounded in a URDF, by
+// 1e-9 rad.
 constexpr double meeting_m = 1e-6;
 // Damping of J_R3⁺, rad/rad: if the sine of the wrist's middle angle is smaller than this, the tool turns later. With
 // 0.03, σ changed so fast at small angles that its border moved the tool against the hand.
@@ -101,8 +101,8 @@ PlaceMargin::Singular PlaceMargin::singular(const Columns& J) const noexcept {
   return {eigen.values.head<3>().cwiseMax(0.0).cwiseSqrt(), eigen.vectors.topLeftCorner<3, 3>()};
 }
 
-// Whether σ is surely far from the border: the squares λ₁ ≤ λ₂ ≤ λ₃ of the singular values satisfy
-// λ₁ ≥ λ₁λ₂λ₃ / ((λ₁ + λ₂ + λ₃)/2)².
+// Whether σ is surely far from the border. The squares λ₁ ≤ λ₂ ≤ λ₃ of the singular values satisfy
+//   λ₁ ≥ λ₁λ₂λ₃ / ((λ₁ + λ₂ + λ₃)/2)²
 bool PlaceMargin::surely_clear(const Columns& J) const noexcept {
   const Mat3 squared = J * J.transpose();
   const double half_sum = 0.5 * squared.trace();

@@ -42,8 +42,8 @@ class BusImage {
   void hand_over() noexcept;
 
   void request(fieldbus::DriveGoal goal) noexcept;
-  // Whether all drives have reported that they no longer hold their joints. The last report of each drive counts, so it
-  // also counts if the drive has become silent.
+  // Whether all drives have reported that they no longer hold their joints. The last report of each drive counts, even
+  // if the drive has become silent.
   [[nodiscard]] bool drives_off() const noexcept;
   // The first drive that hasn't reported that it no longer holds its joint; −1: there is none.
   [[nodiscard]] std::int32_t first_drive_on() const noexcept;

@@ -191,7 +191,7 @@ void Cycle::end_cycle(const ComputeTime& timed) noexcept {
                 .timesteps_answered = timestep_.settled(),
                 .asked_timesteps = requests_.timesteps.taken_from_thread(),
                 .tool = measurement_.tool_evidence(tool_.wanted(), settings_)});
-  recorder_.record().compute_ns = timed.ns();  // without copying the record into its rings
+  recorder_.record().compute_ns = timed.ns();  // doesn't include the copying of the record into the rings
   recorder_.finish();
   ++state_.cycle;
 }

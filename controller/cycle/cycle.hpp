@@ -54,13 +54,13 @@ class Cycle {
   [[nodiscard]] bool stop_requested() const noexcept { return status_.stop_requested(); }
 
   // ---- one thread for each ring: a thread that makes requests, a thread that takes the records
-  // Requests for checked changes of parameters. In rendering and in holds, a cycle takes at most one of them.
+  // Requests for checked changes of parameters. In rendering and in holds, a cycle takes at most one request.
   [[nodiscard]] Requests<Change>& changes() noexcept { return requests_.changes; }
   // Requests for another timestep. Precondition: all drives are on CAN and take positions. The arm stops, the drives
   // get the new timestep, and rendering continues. A request waits until the arm is rendering or in a hold.
   [[nodiscard]] Requests<Timestep>& timesteps() noexcept { return requests_.timesteps; }
-  // Commands. They are taken in every phase, and dropped if they don't apply to it; CycleStatus::refusal() tells in
-  // advance whether a command applies.
+  // Commands. They are taken in every phase, and dropped if they don't apply to it; CycleStatus::refusal() returns
+  // in advance whether a command applies.
   [[nodiscard]] Requests<Command>& commands() noexcept { return requests_.commands; }
   // The records, for the thread that writes files.
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return recorder_.records(); }

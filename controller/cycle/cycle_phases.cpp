@@ -1,4 +1,4 @@
-// Acts in each phase of a session, and at its beginning.
+// Actions of Cycle in each phase of a session, and at the beginning of each phase.
 #include <algorithm>
 #include <bit>
 #include <optional>

@@ -95,8 +95,8 @@ void Cycle::obey(const Command& command) noexcept {
   }
 }
 
-// Starts a release or a back-off. If the arm doesn't stand yet, the order waits until it does, so that a person who is
-// pinned needn't repeat the order.
+// Starts a release or a back-off. The order waits until the arm stands, so that a person who is pinned needn't repeat
+// the order.
 void Cycle::start_freeing(const Command& command) noexcept {
   if (supervisor_.phase() != Phase::holding || !may_move() || timestep_.under_way()) return;
   state_.wants_resume = false;

@@ -20,7 +20,7 @@ struct ShownCycle {
   Phase phase = Phase::idle;
   double period_s = 0.0;              // T, the time from this cycle to the next one
   bool changes_timestep = false;      // a change of T is under way
-  bool pressed = true;                // the enabling input is pressed, or there is none
+  bool pressed = true;                // the enabling input is pressed, or the cell has no enabling input
   bool cause_lasts = false;           // the arm may not move, since the cause of the hold lasts
   bool timesteps_answered = true;     // no requested change of the timestep is under way
   std::uint32_t asked_timesteps = 0;  // number of timestep requests taken from the requesting thread

@@ -48,7 +48,7 @@ struct JudgedCycle {
   std::optional<models::Wrench> load_S{};  // the reading without bias; nullopt: no hand moves the arm
 };
 
-// Bounds of readings; a reading beyond its bound is a fault.
+// Bounds of the sensor's and the encoders' readings. A reading beyond a bound is a fault.
 struct ReadingBounds {
   double max_force_N = 0.0;
   double max_bias_drift_N = 0.0;

@@ -5,8 +5,8 @@
 namespace proxarm::controller {
 namespace {
 
-// Number of cycles at rest without a parameter change before the drives get the new period. At the next SYNC the drives
-// latch the last setpoint, at the SYNC after it they reach the setpoint, and the third cycle is for their answer.
+// Number of cycles at rest without a parameter change before the drives get the new period. At the first SYNC the
+// drives latch the last setpoint, at the second SYNC they reach it, and the third cycle is for their answer.
 constexpr std::uint8_t cycles_at_rest = 3;
 
 }  // namespace

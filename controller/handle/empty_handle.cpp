@@ -39,16 +39,16 @@ EmptyHandle::EmptyHandle(const EmptyHandleConfig& config, double period_s) noexc
 
 void EmptyHandle::set_period(double period_s) noexcept { period_s_ = period_s; }
 
-// Returns the size of the hand's wrench less the force that led the handle. A torque counts as the force that makes it
-// at lever_m.
+// Returns the size of the hand's wrench less the force that led the handle. The lever lever_m converts the torque to a
+// force.
 double EmptyHandle::size_N(const models::Wrench& wrench_W) const noexcept {
   const double force_N = (wrench_W.force - state_.bias_W).norm();
   if (!(config_.lever_m > 0.0)) return force_N;
   return std::max(force_N, wrench_W.torque.norm() / config_.lever_m);
 }
 
-// Lets bias_W follow the sensor's bias that led the handle, since that bias may keep drifting. The caller's tracking of
-// the sensor's bias removes it from the readings once the handle rests.
+// Lets bias_W follow the sensor's bias that led the handle, since the sensor's bias may keep drifting. When the handle
+// rests, Measurement::follow_bias() takes the sensor's bias out of the readings.
 void EmptyHandle::follow() noexcept {
   State& s = state_;
   if (!s.led) return;
@@ -59,7 +59,7 @@ void EmptyHandle::follow() noexcept {
 }
 
 // Returns the longest time within a band before the handle counts as empty. Reason for this bound: the uncertainty of
-// the tare, unknown_N, moves the proxy as long as the handle counts as held; it is large if the sensor is noisy.
+// the tare, unknown_N, moves the proxy while the handle counts as held. A noisy sensor has a large uncertainty.
 double EmptyHandle::longest_empty_s(const HandSigns& signs, double unknown_N) noexcept {
   if (!(signs.mass_kg > 0.0 && unknown_N > 0.0)) return longest_s;
   return std::clamp(std::sqrt(2.0 * unknown_way_m * signs.mass_kg / unknown_N), shortest_quiet_s, longest_s);

@@ -20,8 +20,8 @@
 // With `at_once`, a single unfiltered sample that exceeds this threshold by 8 σ suffices. Precondition of `at_once`:
 // the samples are free of the tool's inertia.
 //
-// A force that acts at the handle (hand_force.hpp) comes from a hand or a load. Even if this force is straight in time,
-// it never makes the handle count as led.
+// A force that acts at the handle (hand_force.hpp) comes from a hand or a load. Such a force never makes the handle
+// count as led, even if the force is straight in time.
 //
 // While the handle is empty, a braking force −M v/τ_b of at most M a_b replaces the hand's force. The proxy treats the
 // braking force like any other force, so nothing jumps.
@@ -36,7 +36,7 @@ namespace proxarm::controller {
 struct EmptyHandleConfig {
   double band_N = 0.1;
   double tool_mass_kg = 0.0;  // mass behind the sensor, which oscillates when the arm brakes
-  double lever_m = 0.0;       // torques count as the force that makes them at this lever; 0: torques don't count
+  double lever_m = 0.0;       // lever that converts a torque to a force; 0: torques don't count
   double way_share = 1.0;     // factor on the distances of 20 and 40 mm
   bool at_once = true;        // one sample far beyond the band suffices to count the handle as held; false: a single
                               // sample may be the tool's inertia
@@ -76,9 +76,9 @@ class EmptyHandle {
   bool step(const HandSigns& signs) noexcept;
 
   [[nodiscard]] bool empty() const noexcept { return state_.empty; }
-  // The handle counts as empty because a force that no hand makes led it (unexplained_way.hpp).
+  // Whether the handle counts as empty because a force that no hand makes has led it (unexplained_way.hpp).
   [[nodiscard]] bool led() const noexcept { return state_.led; }
-  // The handle is empty, and the proxy has stood long enough for the sensor's reading to be its bias.
+  // Whether the handle is empty, and the proxy has stood long enough for the sensor's reading to be the sensor's bias.
   [[nodiscard]] bool rests() const noexcept;
   // The hand's wrench behind the low-pass.
   [[nodiscard]] const models::Wrench& wrench_W() const noexcept { return state_.wrench_W; }

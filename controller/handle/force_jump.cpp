@@ -17,8 +17,8 @@ using models::Wrench;
 // successive samples.
 constexpr double noises = 8.0;
 constexpr double least_noises = 20.0;
-// trend_share averages the trend over some four samples. A force that jitters may meet the extrapolation by chance, so
-// calm_kept makes it count as calm only after some ten calm samples.
+// trend_share averages the trend over some four samples. A force that jitters may equal the extrapolation by chance, so
+// calm_kept makes a force count as calm only after some ten calm samples.
 constexpr double trend_share = 0.25, calm_kept = 0.8;
 constexpr double flipped_share = 0.02, least_flip_N = 1.0, least_turn_N = 10.0;
 // A hand's force that has flipped must grow by this factor within this time, in a cone of 17 degrees (beside_share).

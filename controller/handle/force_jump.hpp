@@ -22,8 +22,8 @@
 //               may be as fast, so two steps don't count: to a small force, and back to the force of up to 50 ms
 //               before.
 //   offset      The load differs from the extrapolation by at least 20 standard deviations of the noise, by at least
-//               max_bias_drift_N, and by at least five times its recent difference. The new force stays like a step's
-//               force, and it doesn't act at the handle (hand_force.hpp).
+//               max_bias_drift_N, and by at least five times its recent difference. The new force stays for 5 ms, as
+//               after a step, and doesn't act at the handle (hand_force.hpp).
 //
 // If the time between samples is longer than a millisecond, the bound of a step rises in proportion. If the sensor's
 // own filter takes longer than a few samples, a step becomes a ramp, which isn't detected. No function allocates, locks

@@ -9,12 +9,12 @@
 // four successive doublings satisfy both conditions:
 //
 //   1. Each factor is 1.45 to 2.1. The last factor is at least 1.6, and at least 0.85 of the largest factor.
-//      - For e^λt each factor is 2. A bias on top of the force makes the factors smaller; they rise towards 2, since
-//        the bias becomes a smaller and smaller share of the force.
+//      - For e^λt each factor is 2. A bias on top of the force makes the factors smaller. These factors rise towards
+//        2, since the bias becomes an ever smaller share of the force.
 //      - A hand's force that begins as tⁿ gives the factor 2^(n/(n+2)) as it begins to accelerate the arm, and smaller
 //        factors later. The first factor is 1.26 for n = 1, and 1.52 for n = 3, a hand that begins without a jerk.
-//      - If the arm yields to the hand, the factors are larger than that, but they fall (2.00, 1.94, 1.51, 1.67: once
-//        in 18 hours of a soak).
+//      - If the arm yields to a hand, the factors are larger than 2^(n/(n+2)), but fall from doubling to doubling
+//        (2.00, 1.94, 1.51, 1.67: once in 18 hours of a soak).
 //      - If damping takes most of the force (B > M λ, possible with passivity damping), each factor must be at least
 //        1.6, since a hand's force of tⁿ then gives 2^(n/(n+1)): 1.41 for n = 1 and 1.59 for n = 2. With a damping of
 //        more than some 800 Ns/m a reversed force can't be told from a hand's force.

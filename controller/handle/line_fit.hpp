@@ -7,8 +7,7 @@
 
 namespace proxarm::controller {
 
-// Sums over the samples since the line began; n = 0: no samples. It is a plain struct, so that its owner can archive
-// it.
+// Sums over the samples since the line began; n = 0: no samples. The struct is plain, so that its owner can archive it.
 struct LineFit {
   models::Vec3 first_W = models::Vec3::Zero();  // first force; subtracted in all sums
   models::Vec3 h = models::Vec3::Zero(), th = models::Vec3::Zero(), hh = models::Vec3::Zero();

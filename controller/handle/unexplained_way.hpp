@@ -5,8 +5,7 @@
 // since the force last bent. The force bends if the residual variance is more than
 //   σ² (1 + d √(2/(n − 2))) + (s F)²
 // σ is the sensor's noise, n the number of samples, d the accepted number of standard deviations of the estimated
-// variance. s F is a share of the force F; it allows for the oscillation of the tool behind the sensor as the arm
-// starts.
+// variance. s F is a share of the force F, for the oscillation of the tool behind the sensor as the arm starts.
 //
 // No hand leads the handle if the force hasn't bent while the handle moved 20 mm, the force now points along the
 // motion, and one of these cases applies:
@@ -58,7 +57,7 @@ class UnexplainedWay {
   struct State {
     LineFit fit;
     models::Vec3 way_W = models::Vec3::Zero();      // distance moved since the line began
-    models::Vec3 first_v_W = models::Vec3::Zero();  // the velocity when the line began
+    models::Vec3 first_v_W = models::Vec3::Zero();  // the proxy's velocity when the line began
     double free_s = 0.0;                            // time since the line began, without the cycles in which the tool's
                                                     // speed limit held the proxy back
   };
@@ -66,7 +65,7 @@ class UnexplainedWay {
   [[nodiscard]] bool leads(const LedHandle& now, const FittedLine& line) const noexcept;
 
   State state_;
-  models::Vec3 line_W_ = models::Vec3::Zero();  // the line's end when it was last tested
+  models::Vec3 line_W_ = models::Vec3::Zero();  // the line's end at the last test of the line
 };
 
 }  // namespace proxarm::controller

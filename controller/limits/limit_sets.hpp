@@ -1,4 +1,4 @@
-// The limits of one step in the N coordinates of a scene, and the projection of a point onto them.
+// Projects a point onto the limits of one step, in the N coordinates of a scene.
 //
 //   min ½‖x − y‖²   over   n_i·x ≤ b_i,  ‖x − c_j‖ ≤ r_j
 //
@@ -27,7 +27,7 @@
 
 namespace proxarm::controller {
 
-// The sets of one step, and the projection onto them. All points x are relative to q₁: x = q − q₁.
+// The sets of one step, and the projection onto these sets. All points x are relative to q₁: x = q − q₁.
 template <int N>
 class LimitSets {
  public:

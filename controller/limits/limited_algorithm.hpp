@@ -11,7 +11,8 @@
 //             friction one solution is exact.
 //   Newton    Semismooth Newton (Qi and Sun 1993) on r(λ) − l(λ), for friction and media. The derivative comes from
 //             finite differences of 𝒢 and from the active limits.
-//   in turn   Block Gauss-Seidel, λ/κ ← l − (r − λ/κ). In its turns 1, 2, 4, 8 … joined and Newton are tried first.
+//   in turn   Block Gauss-Seidel, λ/κ ← l − (r − λ/κ). In turns 1, 2, 4, 8 … of this method, the methods joined and
+//             Newton are tried first.
 // If contacts and limits have no common point, the contacts give way: q is the limits' point nearest to the contacts'
 // point. If the limits alone have no common point, the soft limits (leash, power) give way.
 //

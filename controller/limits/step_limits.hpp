@@ -126,7 +126,7 @@ struct StepLimits {
   std::size_t plane_count = 0;
   std::array<LimitBall<3>, 2> hard{};  // speed, acceleration
   std::size_t hard_count = 0;
-  FollowableStep* arm = nullptr;               // places that the arm can reach; null: it can reach all
+  FollowableStep* arm = nullptr;               // places that the arm can reach; null: every place
   models::Vec3 q_k1_W = models::Vec3::Zero();  // origin of all sets
 };
 
@@ -154,10 +154,10 @@ class StepLimiter {
 
   void set_period(double period_s) noexcept { period_s_ = period_s; }
   // Makes the sets of one step around the proxy, or around the commanded point (sent_point.hpp) if its last two places
-  // are q_k1_W and q_k2_W of `start`. Neither allocates nor throws.
+  // are q_k1_W and q_k2_W of `start`. Doesn't allocate or throw.
   void make(const StepStart& start, FollowableStep* arm, StepLimits& out) const noexcept;
   // Impedance type: makes only workspace and keep-out boxes, as walls for a proxy whose tool is at q_W. Walls don't
-  // slow a tool that hasn't reached them; they push a tool that is beyond them back. rendering/joint_coupling.hpp keeps
+  // slow a tool that hasn't reached them, but push back a tool that is beyond them. rendering/joint_coupling.hpp keeps
   // the joint ranges.
   void make_walls(const models::Vec3& q_W, StepLimits& out) const noexcept;
 

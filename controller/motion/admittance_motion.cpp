@@ -21,7 +21,7 @@ constexpr double leash_tolerance_m = 1e-6;
 constexpr double speed_limit_m_per_s2 = 1.0;
 // If the tool has touched nothing, a hand's force above this value gives the direction of a back-off.
 constexpr double pinning_force_N = 5.0;
-// A torque that turns the tool counts as the force that makes it at this lever, a handle's length.
+// Lever that converts a torque on the tool to a force: a handle's length.
 constexpr double torque_lever_m = 0.1;
 // Allowed lag of a held orientation when the joints can't turn the tool fast enough, near a wrist singularity. It is
 // half of the angle that a person notices in a handle.
@@ -554,8 +554,8 @@ void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   if (ahead_) {
     ahead_->proxy_step.resume(arm_step_.link_rad() - ahead_s() * speed, period_s_ * speed);
     ahead_->proxy_filter.resume(filter.rad() - ahead_s() * speed, speed);
-    // With constant joint speeds the tool moves along a curve. So the proxy is put to the place of its arm step;
-    // otherwise the next cycle would move the proxy there.
+    // With constant joint speeds the tool moves along a curve. So the proxy is put to the place of proxy_step;
+    // otherwise the next cycle would move the proxy to this place.
     const Vec3 c_W = q_W;
     q_W = ahead_->proxy_step.kinematics().X_WT.translation();
     ahead_->point.resume(c_W, q_W, velocity_W);

@@ -90,7 +90,7 @@ class AdmittanceMotion final : public Motion {
     StepLimits limits;  // around the commanded point
   };
 
-  // The tool that moves: while it is being freed, a point without a scene; else the tool in the scene.
+  // The moving tool: a point without a scene while the tool is being freed, else the tool in the scene.
   [[nodiscard]] RenderedTool& tool() const noexcept {
     if (state_.freeing) return parts_.release->tool();
     return *parts_.tool;

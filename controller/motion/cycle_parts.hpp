@@ -64,7 +64,7 @@ struct AdmittanceParts {
 struct CycleParts {
   fieldbus::CanNetwork& network;
   std::vector<DriveOnBus> drives;
-  std::vector<fieldbus::DriveSlot> can_drives;  // the drives on CAN; all drives if they take torques
+  std::vector<fieldbus::DriveSlot> can_drives;  // the drives on CAN; all drives if drives take torques
   std::vector<DriveBus> drive_buses;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
   std::size_t sensor_bus;  // DriveOnBus::no_bus: on a Modbus line
@@ -79,7 +79,7 @@ struct CycleParts {
   description::SupervisionDescription supervision;
 };
 
-// Returns the largest step of each joint in a cycle, at its drive's maximum speed.
+// Returns the largest step of each joint in a cycle: the joint moves at the maximum speed of its drive.
 std::array<double, models::max_axes> max_steps_rad(const std::vector<description::DriveDescription>& drives,
                                                    double period_s) noexcept;
 

@@ -35,13 +35,13 @@ class FinalSetpoints {
     bool guarded = false;      // the tool guard held a setpoint back
     // The commanded setpoints can't catch up with the wanted setpoints, so the motion must continue from the commanded
     // ones. They catch up if the lag is small. Reason: a motion that continues from setpoints takes the motors' angles
-    // for the links' angles, which shakes the tool. A lag is small if it moves the tool by at most the distance that
-    // limits.following_error_rad of the joint with the longest lever moves it.
+    // for the links' angles, which shakes the tool. The largest small lag moves the tool as far as a lag of
+    // limits.following_error_rad at the joint with the longest lever.
     bool differs = false;
   };
   struct Bounds {
     double max_speed_m_per_s;  // the tool's present speed limit
-    models::Vec3 links_W;      // the tool's place by the link angles; the motor angles lead them
+    models::Vec3 links_W;      // the tool's place by the link angles, which the motor angles lead
     const TurnSets* turn;      // limits of turning; null: not judged
   };
   // Moves the setpoints one period towards the wanted ones, motor_rad.
@@ -82,8 +82,9 @@ class FinalSetpoints {
   double period_s_;
   JointGuard guard_;
   ToolGuard tool_guard_;
-  models::JointVector lever_;  // for each joint: the tool's largest distance from its axis, divided by the largest of
-                               // all joints
+  // For each joint: the tool's largest distance from the joint's axis, divided by the largest such distance of all
+  // joints.
+  models::JointVector lever_;
   SetpointEnvelope envelope_;  // of the setpoints; frozen for blocked joints
   State state_;
 };

@@ -33,7 +33,7 @@ struct ProxyMotion {
 
 struct HandJudgeConfig {
   HeldTool tool;
-  double lever_m = 0.0;      // a torque counts as the force that makes it at this lever; 0: torques don't count
+  double lever_m = 0.0;      // lever that converts a torque to a force; 0: torques don't count
   double lag_s = 0.0;        // delay from the proxy to the real arm
   bool always_held = false;  // a hand or a load always holds the handle, so no force counts as a bias
 };

@@ -9,7 +9,7 @@ namespace {
 // The bias follows the reading at rest with the time constant bias_s, at most at bias_N_per_s. A sensor that warms up
 // drifts by 0.01 N/s. A hand whose force grows by less than 0.35 N/s counts as drift, up to max_bias_drift_N.
 constexpr double bias_s = 0.35, bias_N_per_s = 0.35;
-// The bias of a torque counts as the force that makes this torque at this lever, about a handle's length.
+// Lever that converts the bias of a torque to a bias of a force: about a handle's length.
 constexpr double bias_lever_m = 0.1;
 // Largest accepted jump during the tare, a part of which enters the bias. A smaller jump moves an empty handle by 24 mm
 // at most.

@@ -1,4 +1,4 @@
-// Takes all measurements of a cycle: the arm's position by its encoders, and the hand's wrench by the sensor.
+// Takes all measurements of a cycle: the arm's position by the encoders, and the hand's wrench by the sensor.
 //
 // Encoders sit on the motors, and gravity twists the gears between motors and links. The link angles q are the motor
 // angles θ less the twist of the last cycle, so the error of q is at most the twist's change in a cycle:
@@ -51,7 +51,7 @@ struct Measured {
   models::JointVector moved_rad;  // change of the motor angles per cycle, low-passed
   models::JointVector jump_rad;   // change of the motor angles since the last cycle
   AnswerTimes answers;
-  models::JointVector drive_target_rad;  // each drive's last setpoint; its position if it takes none
+  models::JointVector drive_target_rad;  // each drive's last setpoint; without setpoints: the drive's position
   models::JointVector gear_torque_Nm;    // torque of each gear on its link, if the drive measures it; else 0
   // fresh: bits of the drives that answered in this cycle. following: bits of the drives that take setpoints.
   std::uint8_t fresh = 0, following = 0;

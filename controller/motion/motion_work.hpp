@@ -1,5 +1,5 @@
-// Counts a motion's computations. The counts show which computations it could skip; `explain` and `study skip` report
-// them.
+// Counts a motion's computations. The counts show which computations could be skipped; `explain` and `study skip`
+// report the counts.
 #pragma once
 
 #include <cstdint>

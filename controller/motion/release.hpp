@@ -2,7 +2,7 @@
 //
 //   release    The arm follows the hand's force h: M v̇ = h − b v. 10 N give 0.05 m/s.
 //   back off   The tool moves along a direction n at v = √(2 a r), at most at the allowed speed. r: remaining distance.
-//   yield      The tool backs off along the force that stopped the arm, since it may be pressing on somebody. Yielding
+//   yield      The tool, which may be pressing on somebody, backs off along the force that stopped the arm. Yielding
 //              ends when little of this force is left. It also ends if the force doesn't fall within the first 5 mm:
 //              the tool then presses on nothing elastic; the sensor reads wrongly, or a hand pulls.
 //

@@ -11,9 +11,9 @@ using models::Wrench;
 
 // A hand feels a force that changes by 2 N/s as a gradual change, not a jerk, and yields to it.
 constexpr double shortest_fade_s = 1.0, fade_N_per_s = 2.0, fade_Nm_per_s = 0.2;
-// A torque counts as the force that makes it at this lever, a handle's length.
+// Lever that converts the uncertainty of a force to that of a torque: a handle's length.
 constexpr double torque_lever_m = 0.1;
-// Figures are accepted if they explain at least this share of the unexplained reading.
+// New figures are accepted if they explain at least this share of the reading that the present figures don't explain.
 constexpr double explained_share = 0.5;
 
 // Returns the largest accepted reading after the change. A change below the uncertainty `open` is always accepted.

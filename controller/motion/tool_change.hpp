@@ -1,6 +1,6 @@
 // Corrects mass and centre of mass of the tool behind the sensor during a session.
 //
-// Precondition: the tool was mounted during the tare, and the cell gave wrong figures for it. The bias, learnt with
+// Precondition: this tool was mounted during the tare, but the cell gave wrong figures for it. The bias, learnt with
 // gravity g₀ (in S), then contains a wrong weight. m₀, c₀: mass and centre of mass so far; m, c: the corrected ones.
 // The correction is
 //   bias   += −(m − m₀) g₀                         so the bias is the one that a tare with m, c would have found
@@ -21,7 +21,7 @@
 //   2. The present reading: the change of the reading exceeds the tare's uncertainty, but the new reading is neither
 //      within this uncertainty nor at most half of the present reading, and the figures don't halve the tare's
 //      difference from the remembered zero. Even a wrong reading of 0.07 N, within the band of an empty handle, may
-//      move the handle by 10 mm before it is told from a hand's force, and further with a load.
+//      move the handle by 10 mm before it can be distinguished from a hand's force, and further with a load.
 //
 // Nothing allocates, locks or throws after construction.
 #pragma once

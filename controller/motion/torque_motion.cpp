@@ -51,7 +51,7 @@ TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const mod
                  period_s);
 }
 
-// The joints are held at the angles at which the first drive is enabled and its brake opens.
+// The joints are held at their angles at the time when the first drive is enabled and opens its brake.
 void TorqueMotion::wait_for_drives(const Measured& measured) noexcept {
   if (measured.following == 0) rendering_->anchor(measured.link_rad);
   hold(measured, 1.0);
@@ -123,8 +123,8 @@ bool TorqueMotion::render(const MotionCycle& cycle) noexcept {
   return true;
 }
 
-// Returns the bound of the tool's speed. While nobody holds the handle, it falls from the tool's present speed to zero;
-// otherwise it is infinite.
+// Returns the bound of the tool's speed. While nobody holds the handle, this bound falls from the tool's speed to zero;
+// otherwise the bound is infinite.
 double TorqueMotion::largest_tool_speed(const MotionCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   State& s = state_;

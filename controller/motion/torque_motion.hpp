@@ -3,9 +3,9 @@
 // this class has neither run-out nor hold.
 //
 // During the tare, the holding torque less the model's weight, low-passed with 50 ms, is the torque of weight that the
-// model lacks. If it exceeds 2 % of a joint's max_torque_Nm, a fault is raised before anything moves. A smaller torque
-// becomes τ_0, which is compensated from the start on, so an empty device stands still at the pose where it starts. At
-// other poses the model's error is different, and the difference, less friction, moves the device.
+// model lacks. If this torque exceeds 2 % of a joint's max_torque_Nm, a fault is raised before anything moves. A
+// smaller torque becomes τ_0, which is compensated from the start on, so an empty device stands still in its start
+// pose. In other poses the model's error is different, and the difference, less friction, moves the device.
 //
 // When nobody holds the handle (handle/empty_handle.hpp), the device is braked at 4 m/s². Then its joints are held in
 // place while rendering continues. `let_go: hold` acts like `let_go: rest`. The sensor's bias can't move a device of

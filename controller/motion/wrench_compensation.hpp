@@ -31,8 +31,8 @@ class WrenchCompensation {
   void add_tare_sample(const models::Wrench& reading_S, const models::Mat3& R_WS) noexcept;
   // Makes the average the bias. Precondition: at least one sample.
   void finish_tare() noexcept;
-  // Largest deviation of a sample from the mean of the samples before it, in N. If it is larger than the noise,
-  // somebody touched the handle.
+  // Largest deviation of a sample from the mean of the samples before it, in N. If this deviation is larger than the
+  // noise, somebody has touched the handle.
   [[nodiscard]] double tare_spread_N() const noexcept { return tare_spread_N_; }
   // Standard deviation of a sample's force in the noisiest axis, in N. Precondition: finish_tare() was called.
   [[nodiscard]] double noise_N() const noexcept;

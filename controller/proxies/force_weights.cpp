@@ -210,8 +210,8 @@ void ForceWeights<N>::report(const Given& given, const V& p_hat_of_26, ProxyTria
   }
 }
 
-// Computes the step from q̃. On entry `out` and `now` contain the step from q₁. It is an event if the two steps don't
-// have the same contacts, each from the same side: q̃ may be beyond a two-sided wall. `unresolved`: 𝒢's count of
+// Computes the step from q̃. On entry `out` and `now` contain the step from q₁. An event is found if the two steps
+// don't have the same contacts, each from the same side: q̃ may be beyond a two-sided wall. `unresolved`: 𝒢's count of
 // unresolved steps before this step.
 template <int N>
 ProxyFault ForceWeights<N>::from_ahead(const Given& given, std::uint64_t unresolved, ProxyTrial<N>& out,
@@ -313,8 +313,8 @@ void ForceWeights<N>::look_for_onset(const Given& given, const ProxyTrial<N>& ou
   lets_go_ = true;
 }
 
-// Whether the step in `out`, which leads into other media, can be cut at the media's border. If there are contacts, it
-// can't be cut: it is then an event like any other.
+// Whether the step in `out`, which leads into other media, can be cut at the media's border. A step with contacts
+// can't be cut: it is an event like any other.
 template <int N>
 bool ForceWeights<N>::crosses(const Given& given, const ProxyTrial<N>& out) const noexcept {
   return undamped_ && given.past.period_k1_s == period_s_ && (mode_ == Mode::free || mode_ == Mode::medium) &&
@@ -370,9 +370,9 @@ ProxyFault ForceWeights<N>::cut(const Given& given, ProxyTrial<N>& out, bool& ev
 
 // Computes one step of constant acceleration, with the force of a velocity law in the middle of the step:
 //   q = q₁ + T v₁ + T²(h + F)/(2M)   gives   κ = 2M/T² + B/T + K_v,   p̂ = q₁ + [2Mv₁/T + K_v(q_ref − q₁) + h]/κ
-// If B or K_v isn't zero, this is the first step of a motion. Otherwise it follows a medium's border, and the velocity
-// becomes v = v₁ + T(h + F)/M. After the second step F and its slope are known, and the history is set as if the motion
-// had crossed no border:
+// If B or K_v isn't zero, this is the first step of a motion. Otherwise this step follows a medium's border; the
+// velocity becomes v = v₁ + T(h + F)/M. After the second step F and its slope are known, and the history is set as if
+// the motion had crossed no border:
 //   q(k−2) = q − Tv + ½T²a − T³ȧ/6,   Ma = h + F at t_{k+1}
 template <int N>
 ProxyFault ForceWeights<N>::parabola(const Given& given, ProxyTrial<N>& out, bool& event) noexcept {
@@ -432,7 +432,7 @@ auto ForceWeights<N>::contacts_of(const Given& given, const ProxyTrial<N>& out, 
 }
 
 // Whether the normal of each of `contacts` is within 90° of the normal in `normals` of the contact in `set` with the
-// same object and feature. It is also an event if a curved surface turns its normal by more in a third of a step.
+// same object and feature. A curved surface whose normal turns by more in a third of a step is an event, too.
 template <int N>
 bool ForceWeights<N>::same_sides(const ContactSet& set, const std::array<V, max_contacts>& normals,
                                  std::span<const models::Contact<N>> contacts) noexcept {

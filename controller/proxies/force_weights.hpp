@@ -1,7 +1,7 @@
 // Computes a step of order 2 of the admittance proxy: (26) with forces weighted over the last steps, and usually one
 // call of 𝒢.
 //
-// (26) uses the world's force at the end of a step: f(k) at t_{k+1}. For second order it should be the force at t_k.
+// (26) uses the world's force at the end of a step: f(k) at t_{k+1}. For second order it should use the force at t_k.
 // Let f₁ = f(k−1), and so on with the other symbols. F is the force of world, spring and damping:
 //   F = f − K_v(q − q_ref) − B(3q − 4q₁ + q₂)/(2T)
 // With weights w₀ … w₃ the equation of motion is
@@ -40,7 +40,7 @@
 // If the proxy enters or leaves a medium, the step is cut at the medium's border (found by bisection). Two steps along
 // parabolas of constant acceleration follow; they give the new history.
 //
-// One caller at a time. step() may be called in the cycle: it doesn't allocate, lock, throw or print.
+// One caller at a time. step() may be called in the cycle, since it doesn't allocate, lock, throw or print.
 #pragma once
 
 #include <algorithm>

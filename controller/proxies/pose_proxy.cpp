@@ -15,8 +15,9 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-// Largest turn of p̂ from q in a step; larger turns are reduced to it. The torque for a turn of more than half a turn
-// would pull back, and a full turn wouldn't pull at all. 10 Nm on 3e-5 kg m² at 250 Hz make such a turn.
+// Largest angle by which p̂ is turned from q in a step; larger angles are reduced to this. The torque towards p̂ would
+// pull back if the angle exceeded half a turn, and would be zero at a full turn. 10 Nm on 3e-5 kg m² at 250 Hz would
+// turn p̂ by nearly a full turn.
 constexpr double kMostTurn_rad = 1.0;
 
 Mat3 cross_matrix(const Vec3& v) noexcept {

@@ -107,8 +107,8 @@ JointCoupling::Box JointCoupling::box(const JointMatrix& M) const noexcept {
   return box;
 }
 
-// The multiplier of the release's row may be at most `price`. If it would be larger, the program is solved again
-// without this row, and with the force `price` in the row's direction.
+// The multiplier of the release's row may be at most `price`. If the multiplier would be larger, the program is solved
+// again without this row, and with the force `price` in the row's direction.
 JointVector JointCoupling::nearest(const JointVector& u_hat, const JointMatrix& M, const Jacobian& J_W, const Box& box,
                                    const Bounds& bounds, double price, double& paid) noexcept {
   const JointVector still = JointVector::Zero(u_hat.size());

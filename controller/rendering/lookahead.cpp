@@ -9,8 +9,8 @@ using models::Vec3;
 
 namespace {
 
-// H/T is a quotient of decimal numbers. If rounding makes it slightly smaller than a whole number, it counts as this
-// number.
+// H/T is a quotient of decimal numbers. A quotient that rounding makes slightly smaller than a whole number counts as
+// this number.
 constexpr double rounding_steps = 1e-9;
 
 }  // namespace

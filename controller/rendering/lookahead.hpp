@@ -30,7 +30,7 @@ class Lookahead {
   using V = models::Vec<N>;
   using Basis = Eigen::Matrix<double, 3, N>;
 
-  // Largest number of predicted steps; longer horizons are shortened to it. The prediction for the longest horizon at
+  // Largest number of predicted steps; longer horizons are shortened. The prediction for the longest horizon at
   // the shortest timestep would take more than a cycle.
   static constexpr int most_steps = 200;
 

@@ -17,7 +17,8 @@ using models::Vec3;
 // Speed at which the spring's reference returns to the tool's start pose, after the spring has become stiffer and after
 // a hold. It is slow enough for a hand to follow.
 constexpr double reference_m_per_s = 0.05, reference_rad_per_s = TurnSets::returning_rad_per_s;
-// A tool that touches an object at its start may be inside it by this rounding of positions of some metres.
+// Rounding error of positions of some metres. A tool that touches an object at its start may be inside the object by
+// this distance.
 constexpr double rounding_m = 1e-12;
 // After a hold in contact, the twisted gears put the tool some micrometres inside the object. The start pose is
 // corrected if the correction is at most this large.
@@ -61,7 +62,7 @@ void PoseWorld::start(const Vec3& q_W) noexcept {
 }
 
 // Returns the pose nearest to `wanted` that 𝒢 reaches from the last pose, which is outside all objects. Returns
-// `wanted` if it is outside all objects, or if the reached pose is too far from it.
+// `wanted` if `wanted` is outside all objects, or if the reached pose is too far from `wanted`.
 ToolPose PoseWorld::outside(const ToolPose& wanted) noexcept {
   if (g_->clearance_m(wanted) >= -rounding_m) return wanted;
   const ToolPose reached = g_->step(proxy_.K(), wanted, proxy_.q());

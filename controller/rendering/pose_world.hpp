@@ -41,7 +41,8 @@ struct PoseWorldConfig {
 
 class PoseWorld final : public RenderedWorld {
  public:
-  // Precondition: the scene outlives this object, and `g` is its tool's 𝒢 (scenes/rigid/compile_rigid.hpp).
+  // Precondition: the scene outlives this object, and `g` is the 𝒢 of the scene's tool
+  // (scenes/rigid/compile_rigid.hpp).
   PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, scenes::CompiledScene& scene, const PoseWorldConfig& config);
 
   // Sets the hand's torque about the rendered point in the next step.

@@ -4,7 +4,7 @@ namespace proxarm::controller {
 
 using models::Vec3;
 
-// With the default damping, J/D already equals TurnSets::braking_s, and nothing is added.
+// The torque is zero with the default damping, since J/D then equals TurnSets::braking_s.
 Vec3 RenderedTool::braking_torque_W() const noexcept {
   const double wanted = inertia_kg_m2() / TurnSets::braking_s, damping = turning_damping_Nms_per_rad();
   if (!(wanted > damping)) return Vec3::Zero();

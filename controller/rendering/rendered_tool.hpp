@@ -35,8 +35,8 @@ class RenderedTool {
   virtual WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept = 0;
 
   // Call if the arm couldn't follow: the proxy continues with velocity v_W from the place nearest to q_W that the scene
-  // lets it reach. Returns this place. The first form doesn't change orientation and angular velocity; the second form
-  // sets them.
+  // lets it reach. Returns this place. Only the second form sets orientation and angular velocity; with the first form
+  // the tool turns on as before.
   virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W, const Eigen::Quaterniond& R_WT,
                       const models::Vec3& omega_W) noexcept {

@@ -77,8 +77,7 @@ std::unique_ptr<TorqueRendering> make_torque_rendering(scenes::CompiledScene& sc
                                                        const ImpedanceConfig& config);
 
 // Returns the largest share s ≤ 1 with |base + s wanted| ≤ most − |beside| in each joint; 0 if `base` alone exceeds
-// this bound. `beside`: torque that is reserved in both directions. `cut`: bits of the joints that reduce s are added
-// to it.
+// this bound. `beside`: torque that is reserved in both directions. Adds the bits of the joints that reduce s to `cut`.
 [[nodiscard]] double torque_share(const models::JointVector& wanted, const models::JointVector& base,
                                   const models::JointVector& beside, const models::JointVector& most,
                                   std::uint8_t& cut) noexcept;

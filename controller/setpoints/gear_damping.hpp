@@ -11,8 +11,8 @@
 // error τ_e moves a motor by at most κ τ_e/(k a e). Without Jᵀh a motor also yields to the hand: a felt mass of 10 kg
 // at 10 Hz was then wrong by 50 to 80 % instead of 26 %.
 //
-// Both first-order lags are exact for a constant torque over the period. If a drive's answer is missing, its last
-// reading is used. Nothing allocates, locks or throws after construction.
+// Both first-order lags are exact for a constant torque over the period. If a drive's answer is missing, the
+// drive's last reading is used. Nothing allocates, locks or throws after construction.
 #pragma once
 
 #include <array>
@@ -71,8 +71,8 @@ class GearDamping {
     double read_Nm, weight_Nm;
   };
   // Returns the first joint whose reading is reversed. Joints are judged only if their weight torque is at least a
-  // quarter of the largest. A sensor's offset looks like a wrong sign only if it exceeds 4/3 of the weight torque.
-  // Torques read by a second encoder aren't judged, since its offset is unknown.
+  // quarter of the largest. A sensor's offset looks like a wrong sign only if the offset exceeds 4/3 of the weight
+  // torque. Torques read by a second encoder aren't judged, since that encoder's offset is unknown.
   [[nodiscard]] std::optional<Reversed> reversed() const noexcept;
   void archive(fieldbus::StateArchive& state) noexcept;
 

@@ -1,7 +1,7 @@
 // Computes the share of the drives' torque (drives[].max_torque_Nm) that holds the arm's weight.
 //
 // If this share exceeds the share that a step near full stretch may use (drive_torques.hpp), almost no torque is left
-// to accelerate and brake, and the arm is slow near full stretch. A session can report this before it begins.
+// to accelerate and brake, and the arm is slow near full stretch. So the session can report the share at its start.
 #pragma once
 
 #include "models/arm/arm.hpp"

@@ -1,11 +1,12 @@
 // Keeps each setpoint within its joint's range, speed and acceleration. The tool guard (tool_guard.hpp) comes after
 // this guard, keeps the bounds of the joints as well, and has the last word.
 //
-// Bounds of each joint, where θ₁ is the last setpoint, u₁ its speed, T the period, a and v the joint's limits:
+// Bounds of a joint's setpoint θ and speed u, where θ₁ and u₁ are the last setpoint and speed, T is the period, and a
+// and v are the joint's limits:
 //   |u − u₁| ≤ aT,   |u| ≤ v,   u ≤ c(θ_max − θ₁),   −u ≤ c(θ₁ − θ_min),   θ = θ₁ + uT
 //   c(d) = −aT + √(a²T² + 2ad): highest speed from which braking at a ends within the distance d (limits/braking.hpp)
-// These bounds never conflict. Let d be the distance from an end of the range, and u ≤ c(d), that is
-// Tu + u²/(2a) ≤ d. Then the braking speed u' = u − aT satisfies Tu' + u'²/(2a) ≤ d − Tu, the bound of the next period.
+// These bounds never conflict. Let d be the distance from an end of the range, and u ≤ c(d), that is Tu + u²/(2a) ≤ d.
+// Then the braking speed u' = u − aT satisfies Tu' + u'²/(2a) ≤ d − Tu, the bound of the next period.
 //
 // A wanted setpoint within all bounds passes unchanged. Otherwise the setpoint lags behind the wanted setpoint, and
 // catches up in minimum time: its speed is the wanted setpoint's speed plus c(lag) towards the wanted setpoint. Nothing

@@ -1,7 +1,7 @@
 // Computes the interval of angles in which a drive that follows its setpoints must be, for any filter in its control
 // loop.
 //
-// A drive's position is a weighted mean of its setpoints: the drive latches them at SYNC and interpolates, and its
+// A drive's position is a weighted mean of its setpoints: the drive latches setpoints at SYNC and interpolates, and its
 // control loop lags. The drive's answer is delayed as well. s(k): the setpoint. T: the period. τ: the sum of all these
 // delays (following_lag_s()). The envelope is
 //   h(k) = max(s(k), s(k) + (1 − T/τ)(h(k−1) − s(k))),   l(k) = min(s(k), s(k) + (1 − T/τ)(l(k−1) − s(k)))

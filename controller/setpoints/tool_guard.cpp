@@ -21,7 +21,7 @@ constexpr int bisections = 10;
 // rad at usual accelerations; three rounds leave 1e-6 rad at the end of the longest braking distance.
 constexpr int quick_rounds = 1, exact_rounds = 3;
 // Shares of the speed limits that setpoints may use. Drives overshoot by up to 7 % when the guard acts, and the arm may
-// exceed its limit by at most 5 %. The quick test is stricter than the exact test, and leaves close cases to it.
+// exceed its limit by at most 5 %. The quick test is stricter than the exact test, which judges close cases.
 constexpr double exact_share = 0.99, quick_share = 0.985, quick_way_m = 1e-4;
 constexpr double touching_m = 1e-10;
 // Tolerances of turning. turned_rad is for orientations, since setpoints are rounded to counts of some 1e-7 rad.
@@ -144,8 +144,8 @@ double ToolGuard::bend(const JointVector& d) const noexcept {
   return size.dot(curvature_.lazyProduct(size));
 }
 
-// Returns the braking distance after a step, as a multiple of this step: the sum of 1 − kT/t over the periods
-// k = 1 … t/T.
+// Returns the braking distance after a step, as a multiple of this step: the sum of 1 − kT/t over the periods k = 1 …
+// t/T.
 double ToolGuard::braking_steps(double t) const noexcept {
   const double T = period_s_, steps = std::floor(t / T);
   return steps < 1.0 ? 0.0 : steps - 0.5 * steps * (steps + 1.0) * T / t;
@@ -192,8 +192,8 @@ Eigen::Quaterniond ToolGuard::orientation(const JointVector& link_rad) const noe
 }
 
 // Judges turning in this step and on the way to rest. On this way the tool is assumed to approach a limit as fast as in
-// this step, and the motors' lead vanishes. If the tool turns along a limit, straight braking in joint space takes it a
-// few milliradians beyond the limit; this happens only in a stop.
+// this step, and the motors' lead vanishes. If the tool turns along a limit, straight braking in joint space takes the
+// tool a few milliradians beyond the limit; this happens only in a stop.
 void ToolGuard::judge_turning(const JointVector& theta, const ArmPoints& at, const Limits& limit, double more_steps,
                               ActiveLimits& out) const noexcept {
   const TurnSets& turn = *limit.turn;

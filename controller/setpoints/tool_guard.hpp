@@ -9,9 +9,9 @@
 //   ranges        The joint guard keeps wanted setpoints within the joints' ranges; this guard keeps only the setpoints
 //                 of its own braking within them.
 //
-// Borders apply to the links. Motors that accelerate links lead them by K⁻¹Mq̈_f (elastic_setpoint.hpp), a millimetre
-// at 10 m/s². So p(θ) may be beyond a border while the tool isn't. For borders, p(θ) is therefore corrected by its
-// difference from the tool's place at the filter's output, up to `most_lead_m` along each axis.
+// Borders apply to the links. Motors that accelerate links lead the links by K⁻¹Mq̈_f (elastic_setpoint.hpp), a
+// millimetre at 10 m/s². So p(θ) may be beyond a border while the tool isn't. For borders, p(θ) is therefore corrected
+// by its difference from the tool's place at the filter's output, up to `most_lead_m` along each axis.
 //
 // The bounds must also hold on the way to rest. From θ, with the speed u = (θ − θ₁)/T, all joints brake together along
 // u, in the time t that the slowest joint needs at its maximum deceleration:

@@ -29,10 +29,10 @@
 // In the shipped scenes, drives that follow have an `away` of up to 0.024 mrad. At their torque limit drives lag, catch
 // up and may overshoot by 5 to 8 mrad: this stops two of 400 random test sessions with hands of up to a kilonewton.
 //
-// A hand may hold a joint back. It counts as the cause of the joint's lag if its torque about the joint, Jᵀh, points
-// back and is at least a tenth of the torque J_r a, which accelerates the rotor inertia J_r at the limit a: every drive
-// must have that torque. drive_blocked then waits five seconds instead of half a second. In the default cell this takes
-// 174 Nm about the base axis, or 220 N at 0.8 m.
+// A hand may hold a joint back. The hand counts as the cause of the joint's lag if its torque about the joint, Jᵀh,
+// points back and is at least a tenth of the torque J_r a, which accelerates the rotor inertia J_r at the limit a:
+// every drive must have that torque. drive_blocked then waits five seconds instead of half a second. In the default
+// cell this takes 174 Nm about the base axis, or 220 N at 0.8 m.
 //
 // Nothing allocates, locks or throws after construction.
 #pragma once

@@ -3,8 +3,8 @@
 //
 // The switch counts as released while its state is unknown: before the first message, if the last message is older than
 // the timeout, or if the message is too short to contain the bit. To start or continue, the person must press the
-// switch anew: one message must report it released and the next message pressed, within the timeout. A switch that is
-// held, tied down or stuck at "pressed" never starts anything.
+// switch anew: one message must report "released", and the next message, within the timeout, must report "pressed". A
+// switch that is held, tied down or stuck at "pressed" never starts anything.
 //
 // A three-position switch has a second contact, which closes when the switch is squeezed through (IEC 60204-1, 10.9):
 //

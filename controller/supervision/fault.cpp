@@ -193,7 +193,8 @@ std::string seen(const FaultReport& report, const std::string& where) {
   return line + " at cycle " + std::to_string(report.cycle);
 }
 
-// A vector points along a direction if at least this share of its length does: it is then within 26 degrees of it.
+// A vector counts as pointing along an axis if its component along this axis is at least this share of its length, that
+// is within 26 degrees.
 constexpr double mostly = 0.9;
 
 // Returns the number with two digits; from 10 on as a whole number.

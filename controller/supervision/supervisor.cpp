@@ -123,7 +123,7 @@ bool Supervisor::escalates(Fault fault) const noexcept {
 Reaction Supervisor::reaction_now(Fault fault) const noexcept {
   if (escalates(fault)) return Reaction::stop_0;
   const Reaction reaction = reactions_[static_cast<std::size_t>(fault)];
-  // In other phases than rendering, holding and freeing the arm can't be held, so it is stopped.
+  // The arm can be held only in rendering, holding and freeing. In other phases the reaction is a stop instead.
   return reaction == Reaction::hold && !live() ? Reaction::stop_1 : reaction;
 }
 
