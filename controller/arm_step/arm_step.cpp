@@ -41,9 +41,9 @@ constexpr double set_tolerance = 1e-9;
 // longest braking time from any speed: with the braking time from the present speed, joints that get faster would pass
 // the border.
 constexpr double approach_s = 0.1;
-// If a held orientation lags, the tool's turning accelerates at catching_rad_per_s2, up to catching_share of the
-// turning speed limit, and ends with the time constant catching_s. The end of a handle, 0.1 m from T, then accelerates
-// at 0.5 m/s².
+// If the tool lags behind a held orientation, its turning accelerates at catching_rad_per_s2, up to catching_share of
+// the turning speed limit, and ends with the time constant catching_s. The end of a handle, 0.1 m from T, then
+// accelerates at 0.5 m/s².
 constexpr double catching_s = 0.1, catching_rad_per_s2 = 5.0, catching_share = 0.25;
 // Largest lag that one step may close; 1 µm at a metre.
 constexpr double caught_up_rad = 1e-6;
@@ -133,7 +133,7 @@ void ArmStep::begin(const ArmStepStart& start) noexcept {
   if (start.held && eases_) turn_gently();
 }
 
-// Sets the orientation that this step shall reach. If a held orientation lags, this is an orientation on the way to
+// Sets the orientation that this step shall reach. If the tool lags behind a held orientation, it is one on the way to
 // R_WT, so that the tool's turning accelerates no faster than joints can, and slows down towards R_WT.
 void ArmStep::aim(const Eigen::Quaterniond& R_WT) noexcept {
   start_.R_WT = aim_ = R_WT;

@@ -5,11 +5,11 @@
 // c: the link angles before the setpoint filter. x, R: the tool's pose by exact kinematics at c(k−1) + u. x_d, R_d: the
 // wanted pose. U is the intersection of these sets:
 //   box      low ≤ u ≤ high. Bounds each joint's range with room to brake, its speed, and its acceleration behind the
-//            filter. The filter's input may jump, as it does at a wall. In three cases steps also keep half of the
-//            acceleration before the filter, unless the place needs more: near a wrist singularity, during a turning
-//            lag, and while a hand turns the tool. With a held orientation, joints that only turn the tool keep this
-//            half even if the place needs more: their motors lead the links that they accelerate, and can't follow
-//            jumps at a wrist.
+//            filter. The filter's input may jump, as it does at a wall. In three cases a joint's acceleration before
+//            the filter is also at most half of its maximum, unless the place needs more: near a wrist singularity,
+//            during a turning lag, and while a hand turns the tool. With a held orientation, joints that only turn the
+//            tool keep this bound even if the place needs more: motors lead the links that they accelerate, and the
+//            motors of a wrist can't follow jumps.
 //   place    −∇σ·u ≤ b. Keeps the arm away from singular poses (place_margin.hpp).
 //   points   |p(u) − p(0)| ≤ vT for elbow and wrist, also while all joints brake after this step (growth_m_per_s()).
 //   turn     The sets of turning (turn_sets.hpp); for a held orientation, its allowed lag.

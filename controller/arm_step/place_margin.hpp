@@ -54,7 +54,7 @@ class PlaceMargin {
   struct Wrist {
     Columns J_W;            // J_w
     models::Vec3 from_T_W;  // position of the wrist from T
-    // P: the motion of the wrist when the last three joints turn the tool.
+    // P: gives the wrist's motion, if multiplied by the rotation by which the last three joints turn the tool.
     models::Mat3 by_turning_W = models::Mat3::Zero();
   };
   [[nodiscard]] Wrist wrist(const models::ToolKinematics& at) const noexcept;

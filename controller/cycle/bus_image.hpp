@@ -81,8 +81,8 @@ class BusImage {
   CycleParts& parts_;
   CycleRecorder& recorder_;
   Alarm& alarm_;
-  std::vector<Outbox> outboxes_;             // by bus; empty between cycles
-  std::vector<fieldbus::BusStatus> status_;  // by bus
+  std::vector<Outbox> outboxes_;             // one for each bus; empty between cycles
+  std::vector<fieldbus::BusStatus> status_;  // one for each bus
   fieldbus::Goodbye goodbye_;
   std::int64_t begun_ns_ = -1;  // t_k of the last cycle; below zero: no cycle has run
   std::uint64_t cycle_ = 0;     // number of the cycle, which times the heartbeat; continues during the goodbye

@@ -42,7 +42,8 @@ std::optional<StandstillMonitor> standstill_monitor(const CycleParts& parts, con
   return StandstillMonitor(parts.arm->axes(), limits.following_error_rad);
 }
 
-// If the drives take torques, the arm can't be held or slowed, so these reactions become stops.
+// Returns the reactions to faults. If the drives take torques, the arm can't be held or slowed, so the reactions `hold`
+// and `slow` become stops.
 Reactions reactions_for(const CycleParts& parts) {
   Reactions reactions = reactions_of(parts.supervision);
   if (!renders_torques(parts)) return reactions;

@@ -39,7 +39,7 @@ struct JudgedCycle {
   const Measured& measured;
   const fieldbus::ForceSample& sample;           // the sensor's latest sample
   const EnablingInput* enabling = nullptr;       // null: the cell has no enabling input
-  std::span<const fieldbus::BusStatus> buses{};  // by the buses' index in the network
+  std::span<const fieldbus::BusStatus> buses{};  // status of each bus, in the network's order
   std::uint32_t overruns_in_a_row = 0;
   bool telling = false;                    // SDO answers are on the buses and may delay a drive's TPDO by one frame
   bool tared = false;                      // the tare is complete, so drives are enabled after a reset
@@ -52,7 +52,7 @@ struct JudgedCycle {
 struct ReadingBounds {
   double max_force_N = 0.0;
   double max_bias_drift_N = 0.0;
-  double beyond_range_rad = 0.0;  // allowed distance of a joint outside its range at the start
+  double beyond_range_rad = 0.0;  // allowed angle of a joint beyond the end of its range, at the start
   double max_force_step_N = std::numeric_limits<double>::infinity();  // force_jump.hpp
   models::Vec3 handle_S = models::Vec3::Zero();                       // handle point, from the sensor's origin
 };

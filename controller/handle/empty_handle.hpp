@@ -43,7 +43,7 @@ struct EmptyHandleConfig {
 };
 
 struct HandSigns {
-  const models::Wrench& hand_W;  // without bias, tool weight and tool inertia
+  const models::Wrench& hand_W;  // the hand's wrench, without bias, tool weight and tool inertia
   double noise_N = 0.0;          // σ; 0: unknown
   bool noise_is_white = true;    // σ is the sensor's noise, not a hand's motion
   double tare_samples = 0.0;     // n

@@ -42,7 +42,7 @@ struct ForceJumpConfig {
 };
 
 struct LoadSample {
-  const models::Wrench& load_S;                       // without bias, with the tool's weight
+  const models::Wrench& load_S;                       // the reading without bias, with the tool's weight
   models::Vec3 hand_S = models::Vec3::Zero();         // the load's force without the tool's weight
   models::Vec3 beside_zero_S = models::Vec3::Zero();  // the bias less the known zero
   double noise_N = 0.0;                               // standard deviation, in the noisiest axis

@@ -342,7 +342,7 @@ class LimitSets {
   // force. `sweeps`: see nearest().
   V project(V x, bool with_soft, ActiveLimits& active, int& sweeps) const noexcept {
     std::array<V, 2> soft{}, hard{};
-    std::array<double, StepLimits::max_planes> pushed{};  // along the planes' normals, ≥ 0
+    std::array<double, StepLimits::max_planes> pushed{};  // corrections along the planes' normals, ≥ 0
     for (auto* corrections : {&soft, &hard}) corrections->fill(V::Zero());
     for (bool first = true; first || sweeps > 0; first = false, --sweeps) {
       double change = 0.0;

@@ -52,7 +52,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
     return {contacts_.data(), count_};
   }
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return inner_->unresolved_steps(); }
-  // True only if contacts squeeze the proxy. A limit that leaves the proxy inside an object shows in active().
+  // True only if contacts squeeze the proxy. If a limit leaves the proxy inside an object, this limit is in active().
   [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
 
   // λ/κ of the last call. The limits' force on the proxy is κ times this.
@@ -65,7 +65,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
   static constexpr int few_joins = 3, most_joins = 10;  // iterations of join() with friction; one suffices without it
   static constexpr int most_jumps = 6;                  // iterations of jump(); two or three if it converges
   static constexpr int most_sweeps = 3000;              // Dykstra's sweeps in total per step, some 50 ns each
-  static constexpr double tolerance_m = 1e-11;          // on r − l: 10 nm/s at 1 kHz
+  static constexpr double tolerance_m = 1e-11;          // tolerance of r = l; 10 nm/s at 1 kHz
   // Change of p for finite differences. They keep seven digits, since 𝒢's rounding errors are 1e-16 m.
   static constexpr double nudge_m = 1e-9;
 

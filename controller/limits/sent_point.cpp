@@ -10,12 +10,13 @@ using models::Vec3;
 
 namespace {
 
-constexpr double tolerance_m = 1e-11;  // 10 nm/s at 1 kHz, as in limited_algorithm.hpp
+constexpr double tolerance_m = 1e-11;  // equals the tolerance in limited_algorithm.hpp: 10 nm/s at 1 kHz
 // Limits that bound the motion of c, not its place. If only these limits are active, c follows p as fast as they allow.
 constexpr auto catches_up =
     static_cast<std::uint16_t>(static_cast<unsigned>(Limit::speed) | static_cast<unsigned>(Limit::acceleration) |
                                static_cast<unsigned>(Limit::power) | static_cast<unsigned>(Limit::leash));
-constexpr int most_sweeps = 300;  // of Dykstra's algorithm, if the sets have almost no common point
+constexpr int most_sweeps =
+    300;  // most sweeps of Dykstra's algorithm in a step, if the sets have almost no common point
 
 }  // namespace
 

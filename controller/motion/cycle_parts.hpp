@@ -32,7 +32,7 @@ struct DriveOnBus {
 
   std::unique_ptr<fieldbus::CyclicDrive> owned;
   fieldbus::CyclicDrive& drive;  // *owned
-  std::size_t bus;               // index in the network; no_bus: on a Modbus line
+  std::size_t bus;               // index of the drive's bus in the network; no_bus: the drive is on a Modbus line
 };
 
 // The first drive that takes no setpoints after its time limit limit_s: enable_timeout_s of the cell's drive, or
@@ -56,7 +56,7 @@ struct AdmittanceParts {
   models::InverseKinematics inverse;
   ElasticSetpoint elastic;
   std::unique_ptr<RenderedTool> tool;
-  std::optional<LinkMotion> links;  // for the passivity observer, if the tool turns
+  std::optional<LinkMotion> links;  // used by the passivity observer if the tool turns
   std::unique_ptr<Release> release;
 };
 
@@ -67,10 +67,10 @@ struct CycleParts {
   std::vector<fieldbus::DriveSlot> can_drives;  // the drives on CAN; all drives if drives take torques
   std::vector<DriveBus> drive_buses;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
-  std::size_t sensor_bus;  // DriveOnBus::no_bus: on a Modbus line
+  std::size_t sensor_bus;  // index of the sensor's bus; DriveOnBus::no_bus: the sensor is on a Modbus line
   // Declared after drives and sensor, so that the lines' threads end before drives and sensor are destroyed.
   std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines;
-  std::unique_ptr<models::Arm> arm;  // on the heap, because other objects keep references to the arm
+  std::unique_ptr<models::Arm> arm;  // the arm is on the heap, because other objects keep references to it
   // The alternative decides the session's type: admittance or impedance.
   std::variant<AdmittanceParts, std::unique_ptr<TorqueRendering>> rendering;
   WrenchCompensation compensation;

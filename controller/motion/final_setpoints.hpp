@@ -42,7 +42,7 @@ class FinalSetpoints {
   struct Bounds {
     double max_speed_m_per_s;  // the tool's present speed limit
     models::Vec3 links_W;      // the tool's place by the link angles, which the motor angles lead
-    const TurnSets* turn;      // limits of turning; null: not judged
+    const TurnSets* turn;      // limits of turning; null: turning isn't judged
   };
   // Moves the setpoints one period towards the wanted ones, motor_rad.
   Result step(const models::JointVector& motor_rad, const Measured& measured, const Bounds& bounds) noexcept;
@@ -85,7 +85,7 @@ class FinalSetpoints {
   // For each joint: the tool's largest distance from the joint's axis, divided by the largest such distance of all
   // joints.
   models::JointVector lever_;
-  SetpointEnvelope envelope_;  // of the setpoints; frozen for blocked joints
+  SetpointEnvelope envelope_;  // envelope of the setpoints; frozen for blocked joints
   State state_;
 };
 

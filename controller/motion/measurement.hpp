@@ -126,8 +126,8 @@ class Measurement {
   const models::Arm& arm_;
   WrenchCompensation compensation_;
   double period_s_;
-  models::ToolKinematics kinematics_;  // at the measured link angles
-  models::ArmPoints points_;           // at the measured link angles
+  models::ToolKinematics kinematics_;  // kinematics at the measured link angles
+  models::ArmPoints points_;           // the arm's points at the measured link angles
   State state_;
 };
 

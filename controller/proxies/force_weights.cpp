@@ -405,7 +405,7 @@ ProxyFault ForceWeights<N>::parabola(const Given& given, ProxyTrial<N>& out, boo
   if (parabolas_left_ > 0) {
     came_from_ += (0.5 * T * T / M) * (given.h_k + out.f);
   } else {
-    const V slope = F_[0] - F_[1], h_slope = given.h_k - h_k1_;  // per period
+    const V slope = F_[0] - F_[1], h_slope = given.h_k - h_k1_;  // change per period
     F_[2] = F_[1] - slope;
     const V force = given.h_k + h_slope + F_[0] + 0.5 * slope;
     came_from_ += (T * T / M) * (0.5 * force - (slope + h_slope) / 6.0);

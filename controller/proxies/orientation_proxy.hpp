@@ -33,7 +33,7 @@
 namespace proxarm::controller {
 
 struct OrientationConfig {
-  bool free = false;                                    // false: held at the start orientation
+  bool free = false;                                    // false: the tool keeps its orientation at the start
   double inertia_kg_m2 = 0.05;                          // J > 0, the felt inertia; larger than I about every axis
   models::Mat3 behind_sensor_T = models::Mat3::Zero();  // I, about the rendered point, along T's axes; kg m²
   double damping_Nms_per_rad = 0.5;                     // D ≥ 0
@@ -79,7 +79,8 @@ class OrientationProxy {
   [[nodiscard]] double kinetic_J() const noexcept;
   // The limits' torque in the last step.
   [[nodiscard]] const models::Vec3& limit_torque_W() const noexcept { return limit_torque_W_; }
-  [[nodiscard]] bool speed_limited() const noexcept { return speed_limited_; }  // in the last step
+  // Whether the speed limit, or a limit of an angle, was active in the last step.
+  [[nodiscard]] bool speed_limited() const noexcept { return speed_limited_; }
   [[nodiscard]] bool angle_limited() const noexcept { return angle_limited_; }
   [[nodiscard]] const OrientationConfig& config() const noexcept { return config_; }
   void archive(fieldbus::StateArchive& state) noexcept {

@@ -40,8 +40,8 @@ struct PoseConfig {
   double period_s = 1e-3;
   // The tool behind the sensor. Its mass is already subtracted from mass_kg.
   double behind_mass_kg = 0.0;
-  models::Vec3 behind_centre_T_m = models::Vec3::Zero();       // c, along T's axes
-  models::Mat3 behind_inertia_T_kg_m2 = models::Mat3::Zero();  // I about T
+  models::Vec3 behind_centre_T_m = models::Vec3::Zero();       // c: centre of mass from T, along T's axes
+  models::Mat3 behind_inertia_T_kg_m2 = models::Mat3::Zero();  // I: inertia about T, along T's axes
 
   // Returns M₆ along T's axes.
   [[nodiscard]] models::Mat6 mass_T() const noexcept;

@@ -60,7 +60,8 @@ class PoseWorld final : public RenderedWorld {
   [[nodiscard]] models::Vec3 angular_velocity_W() const noexcept {
     return proxy_.move().tail<3>() / proxy_.config().period_s;
   }
-  [[nodiscard]] bool turning_limited() const noexcept { return turning_limited_; }  // in the last step
+  // Whether a limit of turning was active in the last step.
+  [[nodiscard]] bool turning_limited() const noexcept { return turning_limited_; }
   // Returns the sets of turning for the next step.
   [[nodiscard]] TurnSets sets() const noexcept;
 
@@ -100,7 +101,7 @@ class PoseWorld final : public RenderedWorld {
   WorldStep last_;                               // last_.touches refers to touches_
   models::Twist walls_ = models::Twist::Zero();  // the walls' wrench in the last step
   models::Vec3 torque_W_ = models::Vec3::Zero(), omega_W_ = models::Vec3::Zero();
-  Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();  // for start() and resume()
+  Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();  // orientation for start() and resume()
   models::ToolPose home_;                                     // the tool's pose at the first start
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0, speed_share_ = 1.0;
   double turning_damping_Nms_per_rad_, added_Nms_per_rad_ = 0.0;

@@ -28,7 +28,7 @@ class RenderedTool {
   // Sets the torque about the rendered point for this period; call before step(). A point tool turns at once; step()
   // reports the fault if turning has failed.
   virtual void turn(const models::Vec3& torque_W) noexcept = 0;
-  // Whether the tool turns in step(); false: in turn().
+  // Whether the tool turns in step(); if false, the tool turns in turn().
   [[nodiscard]] virtual bool turns_in_step() const noexcept = 0;
   // Moves the tool for one period under the hand's force, like RenderedWorld. The result contains the torque of the
   // limits of turning.
@@ -51,13 +51,13 @@ class RenderedTool {
   // Sets the proxy's mass and the figures of the tool behind the sensor. The felt inertia doesn't change.
   virtual void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept = 0;
   virtual void set_period(double period_s) noexcept = 0;
-  virtual void limit_turning(double share) noexcept = 0;  // share of the speed limit, 0 to 1
+  virtual void limit_turning(double share) noexcept = 0;  // share of the turning speed limit, 0 to 1
   virtual void add_turning_damping(double damping_Nms_per_rad) noexcept = 0;
 
   [[nodiscard]] virtual const Eigen::Quaterniond& R_WT() const noexcept = 0;
   [[nodiscard]] virtual models::Vec3 omega_W() const noexcept = 0;  // mean angular velocity over the last step, rad/s
   [[nodiscard]] virtual bool turns() const noexcept = 0;            // false: the orientation is held
-  [[nodiscard]] virtual bool turning_limited() const noexcept = 0;  // in the last step
+  [[nodiscard]] virtual bool turning_limited() const noexcept = 0;  // a limit of turning was active in the last step
   [[nodiscard]] virtual TurnSets sets() const noexcept = 0;         // sets of turning for the next step
   [[nodiscard]] virtual double inertia_kg_m2() const noexcept = 0;
   // The damping of turning that the user has set.

@@ -144,8 +144,7 @@ double ToolGuard::bend(const JointVector& d) const noexcept {
   return size.dot(curvature_.lazyProduct(size));
 }
 
-// Returns the braking distance after a step, as a multiple of this step: the sum of 1 − kT/t over the periods k = 1 …
-// t/T.
+// Returns the braking distance after a step, as a multiple of this step: the sum of 1 − kT/t for k from 1 to t/T.
 double ToolGuard::braking_steps(double t) const noexcept {
   const double T = period_s_, steps = std::floor(t / T);
   return steps < 1.0 ? 0.0 : steps - 0.5 * steps * (steps + 1.0) * T / t;

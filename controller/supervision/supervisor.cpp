@@ -49,7 +49,7 @@ constexpr std::array events{"begin", "enabled", "reenabled", "tared",   "hold", 
                             "stop",  "fault",   "fault_off", "at_rest", "disabled", "wait",   "reset"};
 static_assert(phases.size() == phase_count && events.size() == event_count);
 
-// Whether a drive moves without a command.
+// Whether this fault means that a drive moves without a command.
 bool is_astray(Fault fault) noexcept {
   return fault == Fault::drive_deviates || fault == Fault::position_implausible || fault == Fault::tool_too_fast ||
          fault == Fault::elbow_too_fast;
