@@ -1,4 +1,4 @@
-// Actions of Cycle in each phase of a session, and at the beginning of each phase.
+// Contains Cycle's actions in each phase of a session, and at the beginning of each phase.
 #include <algorithm>
 #include <bit>
 #include <optional>

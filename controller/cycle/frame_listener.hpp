@@ -1,4 +1,4 @@
-// The interface of receivers of frames that aren't process data.
+// Defines the interface of receivers of frames that aren't process data.
 #pragma once
 
 #include <cstddef>

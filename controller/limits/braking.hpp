@@ -1,4 +1,4 @@
-// Highest speeds from which a point can still brake in time.
+// Computes the highest speeds from which a point can brake in time.
 #pragma once
 
 #include <cmath>

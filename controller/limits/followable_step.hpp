@@ -1,5 +1,5 @@
-// The interface of the set of places around q₁ that the arm can reach in one step. A step must also keep the sets of
-// step_limits.hpp.
+// Defines the interface of the set of places around q₁ that the arm can reach in one step. A step must also keep the
+// sets of step_limits.hpp.
 //
 // The set is the image of the joints' limits and has no closed form. A solver for the nearest point of all sets
 // therefore asks whether the arm can reach the found point. If not, the solver adds a half-space that contains all

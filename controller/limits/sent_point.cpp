@@ -15,8 +15,8 @@ constexpr double tolerance_m = 1e-11;  // equals the tolerance in limited_algori
 constexpr auto catches_up =
     static_cast<std::uint16_t>(static_cast<unsigned>(Limit::speed) | static_cast<unsigned>(Limit::acceleration) |
                                static_cast<unsigned>(Limit::power) | static_cast<unsigned>(Limit::leash));
-constexpr int most_sweeps =
-    300;  // most sweeps of Dykstra's algorithm in a step, if the sets have almost no common point
+// Most sweeps of Dykstra's algorithm in a step, if the sets have almost no common point.
+constexpr int most_sweeps = 300;
 
 }  // namespace
 

@@ -46,7 +46,7 @@ class SentPoint {
 
   // Starts with c and proxy at rest at q_W; keeps the horizon.
   void start(const models::Vec3& q_W) noexcept;
-  // Call if the arm couldn't follow: c goes on from c_W and the proxy from q_W, both with velocity_W.
+  // Call if the arm couldn't follow: c continues from c_W, and the proxy from q_W, both with velocity_W.
   void resume(const models::Vec3& c_W, const models::Vec3& q_W, const models::Vec3& velocity_W) noexcept;
   // Advances H by one period. Precondition: called before the proxy's step.
   void advance_horizon() noexcept;

@@ -1,4 +1,5 @@
-// The objects on which every cycle works; session/bring_up.hpp builds and configures them before the first cycle.
+// Defines the objects on which every cycle works; session/bring_up.hpp builds and configures them before the first
+// cycle.
 #pragma once
 
 #include <array>

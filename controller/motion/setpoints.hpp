@@ -1,4 +1,4 @@
-// The setpoints that a motion makes and the drives receive.
+// Defines the setpoints that a motion makes and the drives receive.
 #pragma once
 
 #include <cstdint>

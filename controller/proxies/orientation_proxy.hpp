@@ -79,8 +79,9 @@ class OrientationProxy {
   [[nodiscard]] double kinetic_J() const noexcept;
   // The limits' torque in the last step.
   [[nodiscard]] const models::Vec3& limit_torque_W() const noexcept { return limit_torque_W_; }
-  // Whether the speed limit, or a limit of an angle, was active in the last step.
+  // Whether the speed limit was active in the last step.
   [[nodiscard]] bool speed_limited() const noexcept { return speed_limited_; }
+  // Whether a limit of an angle was active in the last step.
   [[nodiscard]] bool angle_limited() const noexcept { return angle_limited_; }
   [[nodiscard]] const OrientationConfig& config() const noexcept { return config_; }
   void archive(fieldbus::StateArchive& state) noexcept {

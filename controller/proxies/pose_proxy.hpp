@@ -77,7 +77,7 @@ class PoseProxy {
   [[nodiscard]] double holds_Nm_per_rad() const noexcept { return held_share * held_lever_m * held_lever_m * K_(0, 0); }
   [[nodiscard]] double time_s() const noexcept { return time_s_; }
   [[nodiscard]] const PoseConfig& config() const noexcept { return config_; }
-  // ½ vᵀ M₆ v, where v is the velocity of the last step.
+  // Returns ½ vᵀ M₆ v, where v is the velocity of the last step.
   [[nodiscard]] double kinetic_J() const noexcept {
     return 0.5 * move_.dot(mass_W_ * move_) / (config_.period_s * config_.period_s);
   }

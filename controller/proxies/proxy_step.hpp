@@ -1,5 +1,5 @@
-// The parts of a proxy's step that all methods share: parameters, history, p̂ as a weighted sum of the history, and the
-// evaluation of 𝒢.
+// Contains the parts of a proxy's step that all methods share: parameters, history, p̂ as a weighted sum of the
+// history, and the evaluation of 𝒢.
 //
 // All vectors are in one frame. Units: metres, newtons, seconds. N = 1, 2 or 3.
 #pragma once

@@ -1,4 +1,5 @@
-// Changes of parameters while the arm moves. A change is checked first; any thread may then send it to the cycle.
+// Defines the changes of parameters while the arm moves. A change is checked first; any thread may then send it to the
+// cycle.
 #pragma once
 
 #include <array>

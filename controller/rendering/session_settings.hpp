@@ -1,4 +1,4 @@
-// Settings of a session from the command line, apart from cell and scene.
+// Defines the settings of a session from the command line, apart from cell and scene.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// Orders from a person to a running session; the order to end the session is CycleStatus::request_stop(). Orders enter
-// the cycle from another thread or from a script.
+// Defines the orders from a person to a running session; the order to end the session is CycleStatus::request_stop().
+// Orders enter the cycle from another thread or from a script.
 #pragma once
 
 #include <cstdint>
