@@ -100,7 +100,7 @@ class EmptyHandle {
     double quiet_s = 0.0;                        // time within the band
     double rest_s = 0.0;                         // time at rest with the handle empty
     double braking_m_per_s2 = 0.0;               // present bound of the braking; rises to a_b
-    models::Vec3 bias_W = models::Vec3::Zero();  // the force that led the handle; zero: none
+    models::Vec3 bias_W = models::Vec3::Zero();  // the force that led the handle; zero: no force did
     bool empty = false;
     bool led = false;
   };

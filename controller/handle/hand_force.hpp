@@ -9,7 +9,7 @@
 // Three equal first-order lags estimate the tool's acceleration from the proxy's acceleration. The three time constants
 // add up to the delay from the proxy to the real arm: setpoint filter, drives and two periods. Encoders can't replace
 // this estimate: their counts, differentiated twice, may look like more than a child's force. The estimate doesn't
-// contain the gears' oscillation, whose inertial force so remains in the wrench.
+// contain the gears' oscillation, so the inertial force of this oscillation remains in the wrench.
 //
 // A force F with torque τ about the handle's point acts at the handle if its line passes close to this point: |τ| ≤ r
 // |F|. The force of a hand or a load does so. A sensor's offset has no lever about the sensor: τ = −p × F, where p is

@@ -120,8 +120,8 @@ class LimitSets {
   }
 
   // Returns x, moved back into the sets along the line to a base point. The base point is q₁ if q₁ is in the sets, else
-  // the point to which braking leads. Use it if the alternation of contacts and limits, or Dykstra's algorithm, has
-  // left x outside.
+  // the point to which braking leads. Use this function if the alternation of contacts and limits, or Dykstra's
+  // algorithm, has left x outside.
   [[nodiscard]] V draw_back(const V& x, bool with_soft) const noexcept {
     V base = V::Zero();
     for (std::size_t i = 0; i < hard_count_; ++i) {  // the last ball, the acceleration's, has the last word

@@ -431,8 +431,9 @@ auto ForceWeights<N>::contacts_of(const Given& given, const ProxyTrial<N>& out, 
   return set;
 }
 
-// Whether the normal of each of `contacts` is within 90° of the normal in `normals` of the contact in `set` with the
-// same object and feature. A curved surface whose normal turns by more in a third of a step is an event, too.
+// Whether all `contacts` press from the side from which the contacts of `set`, with the normals `normals`, press. Two
+// contacts of one object and feature press from one side if their normals are less than 90° apart. A curved surface
+// whose normal turns by more than that in a third of a step is an event, too.
 template <int N>
 bool ForceWeights<N>::same_sides(const ContactSet& set, const std::array<V, max_contacts>& normals,
                                  std::span<const models::Contact<N>> contacts) noexcept {

@@ -89,8 +89,9 @@ double OrientationProxy::kinetic_J() const noexcept {
   return 0.5 * (config_.inertia_kg_m2 * omega_T.squaredNorm() - omega_T.dot(config_.behind_sensor_T * omega_T));
 }
 
-// When K becomes K', the reference moves so that K'φ' = Kφ, which keeps the torque. If the spring becomes softer, the
-// torque's jump can't hurt, so the reference stays.
+// When the spring's stiffness K becomes K', the reference moves so that the rotation vector φ from the reference
+// becomes φ' with K'φ' = Kφ, which keeps the torque. If the spring becomes softer, the torque's jump can't hurt, so the
+// reference stays.
 void OrientationProxy::set_spring(double spring_Nm_per_rad) noexcept {
   if (!is_not_negative(spring_Nm_per_rad)) return;
   const double before = config_.spring_Nm_per_rad;

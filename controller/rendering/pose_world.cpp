@@ -232,8 +232,8 @@ void PoseWorld::hang(double proxy_mass_kg, const models::ToolInertia& behind) no
   proxy_.set(changed);
 }
 
-// When K becomes K', the reference moves so that K'e' = Ke, which keeps the force. If the spring becomes softer, the
-// force's jump can't hurt, so the reference stays.
+// When a spring's stiffness K becomes K', its reference moves so that the distance e from the reference becomes e' with
+// K'e' = Ke, which keeps the force. If the spring becomes softer, the force's jump can't hurt, so the reference stays.
 void PoseWorld::set_springs(PoseConfig changed) noexcept {
   const PoseConfig before = proxy_.config();
   if (!proxy_.set(changed)) return;

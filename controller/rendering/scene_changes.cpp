@@ -110,7 +110,8 @@ void SceneChanges::tell_scene(std::size_t index) noexcept {
   drive(index, now_m);
 }
 
-// The scene of an object that hasn't changed since the last call is already up to date if no change is under way.
+// Copies all objects of `other`, and sends them to the scene. If no change is under way, an object that hasn't changed
+// since the last call isn't sent again.
 void SceneChanges::follow(const SceneChanges& other) noexcept {
   const bool idle = !under_way_ && !other.under_way_;
   period_s_ = other.period_s_;
