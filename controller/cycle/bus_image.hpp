@@ -1,9 +1,10 @@
 // The cycle's connection to the buses: sends SYNC and poll, receives answers, sends setpoints.
 //
 //   begin()           sends SYNC on every drive bus, then the sensor's poll
-//   receive_until()   passes frames to sensor, drives and other listeners, until all devices have answered or time is
-//   up send_setpoints()  queues the drives' setpoints, and the controller's heartbeat if it is due hand_over() passes
-//   the queued frames to the interfaces, one call per bus
+//   receive_until()   passes frames to sensor, drives and other listeners, until all devices have answered or the
+//                     deadline has passed
+//   send_setpoints()  queues the drives' setpoints, and the controller's heartbeat if it is due
+//   hand_over()       passes the queued frames to the interfaces, one call per bus
 //
 // A frame that can't be sent raises a fault, and so does a received frame that only a master may send. The recorder
 // gets every frame, too. No allocation, lock or throw after construction.

@@ -12,8 +12,8 @@ namespace {
 using models::Vec3;
 using models::Wrench;
 
-// Multiples of σ for a sample less the average of about two before it, whose variance is some 2.3 σ². Exceeded once in
-// 1e7 axes and samples, and never for several in a row.
+// Multiples of σ for the deviation of a sample from its extrapolation, whose variance is some 2.6 σ². Exceeded once in
+// some 1e6 axes and samples, and never for several in a row.
 constexpr double noises = 8.0;
 constexpr double least_noises = 20.0;
 // A force that jitters may meet the extrapolation by chance: it is calm only after some ten calm samples.

@@ -15,7 +15,7 @@
 // sensor's origin, within that uncertainty.
 //
 // A hand that pushes during the tare becomes part of the zero. When it lets go, the opposite of its force remains, and
-// acts at the handle. So a force that equals the difference between tare and known zero acts neither at the handle nor
+// acts at the handle. So a force that equals the known zero less the tare counts neither as acting at the handle nor
 // as an offset.
 //
 // No function allocates, locks or throws.

@@ -99,8 +99,8 @@ class LimitSets {
     }
   };
 
-  // The sets' point nearest to y. If no active sets solve the problem, because the sets have almost no common point,
-  // Dykstra's algorithm computes the point. `sweeps`: its sweeps left; decreased by those made.
+  // The sets' point nearest to y. If no active sets solve the problem, because the sets have no or almost no common
+  // point, Dykstra's algorithm computes the point. `sweeps`: its sweeps left; decreased by those made.
   [[nodiscard]] Nearest nearest(const V& y, bool with_soft, int& sweeps) noexcept {
     Nearest result;
     for (int cuts = 0;; ++cuts) {

@@ -46,7 +46,7 @@ FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const 
   return result;
 }
 
-// Lag of the joint that holds the tool back most, converted to the joint with the longest lever.
+// Lag of the revolute joint that holds the tool back most, converted to the joint with the longest lever.
 double FinalSetpoints::lag_rad() const noexcept { return guard_.lag_rad().cwiseAbs().cwiseProduct(lever_).maxCoeff(); }
 
 JointVector FinalSetpoints::go_on_from_here(std::uint8_t blocked) noexcept {

@@ -34,7 +34,8 @@ class FinalSetpoints {
     bool guarded = false;      // the tool guard held a setpoint back
     // The wanted setpoints can't be caught up; the motion must continue from the commanded ones. A small lag is caught
     // up instead: to continue from setpoints takes the motors' angles for the links' and would shake the tool. A lag is
-    // small if it moves the tool no further than limits.following_error_rad of the joint with the longest lever.
+    // small if it moves the tool no further than limits.following_error_rad of the joint with the longest lever. A
+    // prismatic joint's lag always counts as small, since its lever_ is 0.
     bool differs = false;
   };
   struct Bounds {
@@ -79,7 +80,8 @@ class FinalSetpoints {
   double period_s_;
   JointGuard guard_;
   ToolGuard tool_guard_;
-  models::JointVector lever_;  // of each joint: largest distance of the tool from its axis, relative to the longest
+  // Of each joint: largest distance of the tool from its axis, relative to the longest; 0 for a prismatic joint.
+  models::JointVector lever_;
   SetpointEnvelope envelope_;  // of the setpoints; frozen for blocked joints
   State state_;
 };

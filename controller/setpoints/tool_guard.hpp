@@ -1,4 +1,4 @@
-// Final check of where and how fast setpoints move the tool, independent of all stages before.
+// Final limit on where and how fast setpoints move the tool, independent of all stages before.
 //
 // A setpoint θ stands for the arm at rest there, with gears twisted by gravity alone: θ = q + K⁻¹τ_g(q). p(θ) is the
 // position of T, or of a joint from the third on (elbow and wrist), by exact kinematics. Bounds:

@@ -82,7 +82,7 @@ class DriveMonitor {
   struct State {
     models::JointVector last_rad;       // reported
     models::JointVector away_rad;       // with the sign of d
-    models::JointVector away_s;         // time with more than ε
+    models::JointVector away_s;         // time with |away_rad| more than ε
     models::JointVector behind_s;       // time with |d| more than ε/2 ...
     models::JointVector behind_at_rad;  // ... at this place
     models::JointVector passing_s;      // time since |d| was last more than ε/2

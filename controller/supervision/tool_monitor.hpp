@@ -7,7 +7,8 @@
 //                     1.2 vW + v(mT + 2 t_f) + 0.1 mm,   v = limits.max_tool_speed_m_per_s
 //   elbow_too_fast  the same for the joints from the third on, with limits.max_elbow_speed_m_per_s: the sum over W of
 //                   the largest motion in each cycle
-//   tool_off_limits the tool is more than 2 mm outside limits.workspace_m or inside a box of limits.keep_out_m
+//   tool_off_limits the tool is more than 2 mm outside limits.workspace_m, or more than 2 mm deep in a box of
+//                   limits.keep_out_m
 //
 // The factor 1.2 allows for drives that overshoot (up to 5 % were seen, tests/controller/closed_loop). After up to m =
 // max_missed_feedback cycles without feedback, or at t_f between answers on a Modbus line, one cycle shows all the
