@@ -1,10 +1,10 @@
 // Connects the cycle to the buses: sends SYNC and poll, receives answers, sends setpoints.
 //
-//   begin()            sends SYNC on every drive bus, then the sensor's poll
-//   receive_until()    passes frames to sensor, drives and other listeners until all devices have answered, or until
-//                      the deadline
-//   send_setpoints()   queues the drives' setpoints, and the controller's heartbeat if it is due
-//   hand_over()        passes the queued frames to the interfaces, one call per bus
+//   begin()           sends SYNC on every drive bus, then the sensor's poll
+//   receive_until()   passes frames to sensor, drives and other listeners, until all devices have answered or the
+//                     deadline has passed
+//   send_setpoints()  queues the drives' setpoints, and the controller's heartbeat if it is due
+//   hand_over()       passes the queued frames to the interfaces, one call per bus
 //
 // Two kinds of frames raise a fault: a frame that can't be sent, and a received frame that only a master may send.
 // Every frame is recorded. Nothing allocates, locks or throws after construction.

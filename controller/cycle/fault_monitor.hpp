@@ -59,8 +59,9 @@ struct ReadingBounds {
 
 class FaultMonitor {
  public:
-  // `tool`, `drives_follow`: nullopt if the drives take torques, since a hand then moves the arm freely. In `settings`,
-  // T and the counts of cycles may change later. Precondition: the references outlive this object.
+  // drives_follow and tool: nullopt if the drives take torques, since a hand then moves the arm freely. Precondition:
+  // the drives, settings, supervisor and alarm outlive this object. In `settings`, T and the counts of cycles may
+  // change.
   FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, const ReadingBounds& bounds,
                const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {},
                std::optional<DriveMonitor> drives_follow = {},

@@ -47,9 +47,9 @@ struct HandSigns {
   double noise_N = 0.0;          // σ; 0: unknown
   bool noise_is_white = true;    // σ is the sensor's noise, not a hand's motion
   double tare_samples = 0.0;     // n
-  double sample_cycles = 1.0;    // cycles from one sample of the sensor to the next
-  const models::Vec3& v_W;       // the proxy's velocity in its last step
-  double mass_kg = 0.0;          // the proxy's mass
+  double sample_cycles = 1.0;    // cycles from one sample to the next
+  const models::Vec3& v_W;       // of the proxy, last step
+  double mass_kg = 0.0;          // of the proxy
   bool at_handle = false;        // the force acts at the handle
   bool left_by_tare = false;     // the force is left over from a hand that pushed during the tare
   bool as_offset = false;        // the force acts at the sensor's origin

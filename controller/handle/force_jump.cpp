@@ -12,9 +12,8 @@ namespace {
 using models::Vec3;
 using models::Wrench;
 
-// Multiple of σ allowed to the noise of the difference between a sample and the average of about two samples before it.
-// This difference has a variance of some 2.3 σ². It exceeds 8 σ once in 1e7 samples of an axis, and never in several
-// successive samples.
+// Multiples of σ for the deviation of a sample from its extrapolation, whose variance is some 2.6 σ². Exceeded once in
+// some 1e6 axes and samples, and never for several in a row.
 constexpr double noises = 8.0;
 constexpr double least_noises = 20.0;
 // trend_share averages the trend over some four samples. A force that jitters may equal the extrapolation by chance, so

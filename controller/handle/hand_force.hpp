@@ -17,9 +17,9 @@
 // and |p × F| must be at least three times the uncertainty of τ. A force acts as an offset if its line passes the
 // sensor's origin, within this uncertainty.
 //
-// A hand that pushes during the tare makes its force part of the zero. When the hand lets go, the opposite of its force
-// remains in the reading, and acts at the handle. So a force that equals the known zero less the tare counts neither as
-// acting at the handle nor as an offset.
+// A hand that pushes during the tare becomes part of the zero. When it lets go, the opposite of its force remains, and
+// acts at the handle. So a force that equals the known zero less the tare counts neither as acting at the handle nor
+// as an offset.
 //
 // No function allocates, locks or throws.
 #pragma once

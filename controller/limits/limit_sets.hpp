@@ -103,9 +103,8 @@ class LimitSets {
     }
   };
 
-  // Returns the point nearest to y that keeps all sets. If no active sets solve the problem, because the sets have
-  // almost no common point, Dykstra's algorithm computes the point. `sweeps`: the number of sweeps that Dykstra's
-  // algorithm may still make; decreased by the sweeps made.
+  // The sets' point nearest to y. If no active sets solve the problem, because the sets have no or almost no common
+  // point, Dykstra's algorithm computes the point. `sweeps`: its sweeps left; decreased by those made.
   [[nodiscard]] Nearest nearest(const V& y, bool with_soft, int& sweeps) noexcept {
     Nearest result;
     for (int cuts = 0;; ++cuts) {

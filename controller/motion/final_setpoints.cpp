@@ -17,7 +17,13 @@ FinalSetpoints::FinalSetpoints(const models::Arm& arm, const std::vector<descrip
       guard_(drives_, period_s),
       tool_guard_(arm, drives_, limits, period_s),
       lever_(arm.path_curvature().diagonal()) {
-  lever_ /= lever_.maxCoeff();
+  // A metre of a prismatic joint moves the tool by a metre.
+  double longest_m = lever_.maxCoeff();
+  if (!(longest_m > 0.0)) longest_m = 1.0;
+  for (int drive = 0; drive < arm.axes(); ++drive) {
+    if (arm.slides(drive)) lever_[drive] = 1.0;
+  }
+  lever_ /= longest_m;
   state_.run_out_rad_per_s = JointVector::Zero(arm.axes());
   start(arm.start_rad());
 }
@@ -46,8 +52,7 @@ FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const 
   return result;
 }
 
-// Returns the lag of the joint that holds the tool back most, converted to an angle of the joint with the longest
-// lever.
+// Lag of the joint that holds the tool back most, converted to an angle of the joint with the longest lever.
 double FinalSetpoints::lag_rad() const noexcept { return guard_.lag_rad().cwiseAbs().cwiseProduct(lever_).maxCoeff(); }
 
 JointVector FinalSetpoints::go_on_from_here(std::uint8_t blocked) noexcept {

@@ -33,10 +33,10 @@ class FinalSetpoints {
     ActiveLimits limits;       // limits that held a setpoint back
     std::uint8_t blocked = 0;  // joints whose drives don't follow, as bits
     bool guarded = false;      // the tool guard held a setpoint back
-    // The commanded setpoints can't catch up with the wanted setpoints, so the motion must continue from the commanded
-    // ones. They catch up if the lag is small. Reason: a motion that continues from setpoints takes the motors' angles
-    // for the links' angles, which shakes the tool. The largest small lag moves the tool as far as a lag of
-    // limits.following_error_rad at the joint with the longest lever.
+    // The wanted setpoints can't be caught up; the motion must continue from the commanded ones. A small lag is caught
+    // up instead: to continue from setpoints takes the motors' angles for the links' and would shake the tool. A lag is
+    // small if it moves the tool no further than limits.following_error_rad of the joint with the longest lever; without
+    // a revolute joint, no further than that number of metres.
     bool differs = false;
   };
   struct Bounds {
@@ -82,10 +82,9 @@ class FinalSetpoints {
   double period_s_;
   JointGuard guard_;
   ToolGuard tool_guard_;
-  // For each joint: the tool's largest distance from the joint's axis, divided by the largest such distance of all
-  // joints.
+  // How far each joint moves the tool at most (m/rad, m/m), relative to the revolute joint that moves it most.
   models::JointVector lever_;
-  SetpointEnvelope envelope_;  // envelope of the setpoints; frozen for blocked joints
+  SetpointEnvelope envelope_;  // of the setpoints; frozen for blocked joints
   State state_;
 };
 

@@ -32,10 +32,9 @@ struct SensorBias {
   double noise_N = 0.0;
   bool noise_is_white = true;  // successive samples are independent: nobody moved the handle
   double samples = 0.0;        // number of averaged samples
-  double sample_cycles = 1.0;  // cycles from one sample of the sensor to the next
+  double sample_cycles = 1.0;  // cycles from one sample to the next
   double drift_N = 0.0;        // drift of the bias while nobody held the handle
-  // The tare's mean less the known zero. The difference is drift, or a force on the handle during the tare. It is zero
-  // if no zero is known.
+  // The tare's mean less the known zero: drift, or a force on the handle during the tare. Zero if no zero is known.
   models::Vec3 beside_zero_S = models::Vec3::Zero();
 };
 
@@ -71,7 +70,7 @@ struct Measured {
 
 class Measurement {
  public:
-  // Precondition: the references outlive this object.
+  // Precondition: the drives, the sensor and the arm outlive this object.
   Measurement(std::span<const DriveOnBus> drives, const fieldbus::ForceSensor& sensor, const models::Arm& arm,
               const WrenchCompensation& compensation, double period_s);
 
@@ -84,8 +83,8 @@ class Measurement {
   [[nodiscard]] double tare_spread_N() const noexcept { return compensation_.tare_spread_N(); }
   // Makes the average the bias from this cycle on.
   void finish_tare() noexcept;
-  // One cycle of taring. Returns true when the tare is complete. Raises force_at_start if the handle moved, or if the
-  // mean differs from the known zero by more than drift explains. Raises force_jumped if the reading jumped.
+  // One cycle of taring. Returns true when the tare is complete without a fault. Raises force_at_start if the handle
+  // moved or drift doesn't explain the mean, force_jumped if the reading jumped.
   [[nodiscard]] bool tare(const SessionSettings& settings, double tared_for_s, Alarm& alarm) noexcept;
   void start_tare() noexcept;
   // The present bias, and the tare's results.

@@ -1,4 +1,4 @@
-// Makes the last check of where and how fast setpoints move the tool, independent of all stages before it.
+// Final limit on where and how fast setpoints move the tool, independent of all stages before.
 //
 // A setpoint θ is checked as if the arm were at rest at θ, with gears that only gravity twists: θ = q + K⁻¹τ_g(q). p(θ)
 // is the place of T, or of a joint from the third on (elbow and wrist), by exact kinematics. θ₁ is the last setpoint.

@@ -85,13 +85,13 @@ class DriveMonitor {
 
  private:
   struct State {
-    models::JointVector last_rad;       // reported position of the previous cycle
-    models::JointVector away_rad;       // `away`, with the sign of d
-    models::JointVector away_s;         // counted time with `away` above ε
-    models::JointVector behind_s;       // counted time with |d| above ε/2 while θ stays at behind_at_rad
-    models::JointVector behind_at_rad;  // the place at which θ stays, to within ε/2
-    models::JointVector passing_s;      // time since |d| was last above ε/2
-    models::JointVector setpoint_rad;   // setpoint of the previous cycle
+    models::JointVector last_rad;       // reported
+    models::JointVector away_rad;       // with the sign of d
+    models::JointVector away_s;         // time with |away_rad| more than ε
+    models::JointVector behind_s;       // time with |d| more than ε/2 ...
+    models::JointVector behind_at_rad;  // ... at this place
+    models::JointVector passing_s;      // time since |d| was last more than ε/2
+    models::JointVector setpoint_rad;   // the previous one
     models::JointVector setpoint_rad_per_s;
     std::uint8_t known = 0;    // drives that are being judged
     std::uint8_t braking = 0;  // judged drives that brake by themselves

@@ -3,11 +3,12 @@
 // The guards keep all setpoints within the limits. If the tool is beyond a limit by the encoders, something else moves
 // it: a drive that runs off, a wrong encoder or gear ratio, a slipping brake.
 //
-//   tool_too_fast    Over the last W = 20 ms the tool has moved further than
-//                      1.2 vW + v(mT + 2 t_f) + 0.1 mm,   v = limits.max_tool_speed_m_per_s
-//   elbow_too_fast   The sum over W of the largest motion in each cycle of a joint from the third on exceeds this
-//                    distance, with v = limits.max_elbow_speed_m_per_s.
-//   tool_off_limits  The tool is more than 2 mm outside limits.workspace_m or inside a box of limits.keep_out_m.
+//   tool_too_fast   over the last W = 20 ms the tool has moved further than
+//                     1.2 vW + v(mT + 2 t_f) + 0.1 mm,   v = limits.max_tool_speed_m_per_s
+//   elbow_too_fast  the same for the joints from the third on, with limits.max_elbow_speed_m_per_s: the sum over W of
+//                   the largest motion in each cycle
+//   tool_off_limits the tool is more than 2 mm outside limits.workspace_m, or more than 2 mm deep in a box of
+//                   limits.keep_out_m
 //
 // - The factor 1.2 allows for drives that overshoot. Overshoots of up to 5 % were measured
 //   (tests/controller/closed_loop).

@@ -165,8 +165,9 @@ void append_start_up(std::vector<SdoStep>& steps, const description::BringUp& br
 }
 
 // Appends the drive's reactions to a lost controller and to stop commands. The object that stops the drive when the
-// controller dies is required: 1016h, or 100Ch with `stops_by: life_guarding`. The other objects are optional, because
-// their defaults in the standard stop the arm too.
+// controller dies is required: 1016h, or 100Ch and 100Dh with `stops_by: life_guarding`, or the RPDO timer with
+// `stops_by: setpoint_timer` (append_pdos()). The drive's own heartbeat (1017h) is required, too. The other objects are
+// optional, because their defaults in the standard stop the arm too.
 void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings,
                       const description::BringUp& bring_up) {
   if (bring_up.stops_by == description::StopsBy::heartbeat) append_heartbeat(steps, settings.consumer_heartbeat());

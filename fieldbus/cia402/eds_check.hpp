@@ -15,7 +15,7 @@ namespace proxarm::fieldbus {
 // What the drive loses according to its EDS.
 struct EdsLosses {
   std::vector<std::string> missing;  // one line for each missing object, with its effect
-  std::string fixed;                 // objects that can't be written but have a fitting default, separated by commas
+  std::string fixed;  // objects that can't be written, with a fitting or unknown default; separated by commas
 };
 
 // Returns the EDS's default of 1000h if it is that of a CiA 402 drive (lower half 0192h), else nullopt.

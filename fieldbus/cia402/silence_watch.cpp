@@ -57,7 +57,8 @@ void SilenceWatch::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcep
   if (Emergency emergency; decode_emcy(frame, time_ns, node_, emergency)) {
     if (emergency.code == 0) return;
     if (emcy_ == 0) emcy_ = emergency.code;
-    // 8100h (the stack misses SYNC) is no sign of a stop: the drive keeps moving. Its state shows when it stops.
+    // 8100h (the stack misses SYNC) alone is no sign of a stop: a drive may warn by it and carry on. Its state shows
+    // when it stops.
     constexpr std::uint16_t communication = 0x8100;
     if (emergency.code != communication) react(time_ns);
   } else if (frame.id == heartbeat_id(node_) && frame.length == 1) {
