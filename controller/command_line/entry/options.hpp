@@ -39,6 +39,10 @@ CLI::callback_t choice(std::string option, std::map<std::string, Value> choices,
   };
 }
 
+// CLI11's message about options, in one line and with the nearest one that `command` knows.
+std::string options_mistake(const CLI::App& command, const std::vector<std::string>& words,
+                            const CLI::ParseError& error);
+
 // A whole number in decimal digits.
 CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_t)> store);
 

@@ -13,8 +13,7 @@ namespace proxarm::command_line {
 // printed.
 int run_program(const std::function<int()>& run) noexcept;
 
-// CLI11's message about options in one line, with the nearest one that `command` knows. `called` is how it was called,
-// such as "proxarm run". Returns the exit status.
+// Prints options_mistake(). `called` is how the command was called, such as "proxarm run". Returns the exit status.
 int refuse_options(const CLI::App& command, const std::string& called, const std::vector<std::string>& words,
                    const CLI::ParseError& error);
 
