@@ -46,6 +46,9 @@ class LiveParameters {
   std::uint32_t asked_timesteps_ = 0;
 };
 
+// Throws SetupError that names `key` where nothing of the session can be changed or ordered.
+void require_changeable(const PreparedSession& session, const std::string& key);
+
 // Of the script and the socket, before a bus is opened. Throws SetupError.
 void require_changes(const PreparedSession& session, const RunOptions& options);
 
@@ -58,9 +61,15 @@ struct IdleChange {
 // Of a session that has ended; `texts` are those of its options.
 std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::vector<std::string>& texts);
 
-// The session's script, and its socket where one is wanted; null without. What it says of the session it reads in
-// `box`.
-std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
-                                            const RunOptions& options, const controller::BoxReader& box);
+// The session's script. Before the first cycle; throws SetupError.
+void schedule_changes(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options);
+
+// What orders and changes do to the session while it runs, from any threads. What is asked of it is read in `box`. All
+// must outlive the handlers.
+ControlHandlers control_handlers(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options,
+                                 const controller::BoxReader& box);
+
+// The session's socket, where one is wanted; null without.
+std::unique_ptr<ControlSocket> control_socket(const RunOptions& options, ControlHandlers handlers);
 
 }  // namespace proxarm::command_line

@@ -10,16 +10,10 @@
 #include <string>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/record/black_box.hpp"
 #include "controller/record/replay_log.hpp"
-#include "controller/session/bring_up.hpp"
 
 namespace proxarm::command_line {
-
-// The head of the session's replay: all but first cycle and state.
-controller::ReplayHead replay_head(const PreparedSession& session, const std::vector<std::string>& bus_names,
-                                   const controller::BusIndices& indices);
-// All files that the controller was made from.
-std::vector<std::filesystem::path> replay_files(const PreparedSession& session);
 
 class BlackBoxKeeper {
  public:

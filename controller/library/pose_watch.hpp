@@ -12,42 +12,41 @@
 #include "controller/report/summary.hpp"
 #include "controller/stability/passed_poses.hpp"
 
-namespace proxarm::command_line {
+namespace proxarm::controller {
 
 class PoseWatch {
  public:
-  explicit PoseWatch(controller::PassedPoses poses) : poses_(std::move(poses)) {}
+  explicit PoseWatch(PassedPoses poses) : poses_(std::move(poses)) {}
   PoseWatch(const PoseWatch&) = delete;
   PoseWatch& operator=(const PoseWatch&) = delete;
   ~PoseWatch();  // what isn't judged by then isn't
 
   // Before the first place.
   void find_smallest() { poses_.find_smallest(); }
-  void change(const controller::LoopModel& loop) { poses_.change(loop); }
+  void change(const LoopModel& loop) { poses_.change(loop); }
   template <class Joints>
-  void pass(double time_s, const models::ToolPose& tool_W, const controller::PassedPoses::Felt& felt,
-            const Joints& joints_rad) {
+  void pass(double time_s, const models::ToolPose& tool_W, const PassedPoses::Felt& felt, const Joints& joints_rad) {
     if (auto asked = poses_.come_to(time_s, tool_W, felt, joints_rad)) ask(std::move(*asked));
   }
   // What should be told by now and wasn't yet, in its order.
-  [[nodiscard]] std::vector<controller::UnstablePlaces> news();
+  [[nodiscard]] std::vector<UnstablePlaces> news();
   // Places judged since it was asked last, where the smallest stable mass is looked for.
-  [[nodiscard]] std::vector<controller::PassedPoses::Place> places();
+  [[nodiscard]] std::vector<PassedPoses::Place> places();
   // Waits until all is judged.
-  [[nodiscard]] controller::PosesSummary summary();
+  [[nodiscard]] PosesSummary summary();
 
  private:
-  void ask(controller::PassedPoses::Asked asked);
+  void ask(PassedPoses::Asked asked);
   void work();
 
-  controller::PassedPoses poses_;
+  PassedPoses poses_;
   std::mutex mutex_;  // of what follows
   std::condition_variable changed_;
-  std::deque<controller::PassedPoses::Asked> asked_;
-  std::vector<controller::UnstablePlaces> news_;
-  std::vector<controller::PassedPoses::Place> found_;  // and not told yet
+  std::deque<PassedPoses::Asked> asked_;
+  std::vector<UnstablePlaces> news_;
+  std::vector<PassedPoses::Place> found_;  // and not told yet
   bool busy_ = false, ends_ = false;
   std::thread thread_;
 };
 
-}  // namespace proxarm::command_line
+}  // namespace proxarm::controller

@@ -1,0 +1,47 @@
+// Whether the loop is stable in the poses that a session is led through: at the start only the start pose was judged.
+// Out of the session's records, in a thread of its own (pose_watch.hpp). Of the admittance type.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/library/pose_watch.hpp"
+#include "controller/record/cycle_record.hpp"
+#include "controller/signals/derived_signals.hpp"
+
+namespace proxarm::controller {
+
+class LedPoses {
+ public:
+  // All must outlive it.
+  LedPoses(const command_line::PreparedSession& session, const command_line::RunOptions& options,
+           const SignalDeriver& deriver);
+
+  // Every record, in order.
+  void add(const CycleRecord& record);
+  // Whether most samples of the last quarter of a second were late: the loop is judged with their age then.
+  [[nodiscard]] bool samples_late() const noexcept { return samples_late_; }
+
+  [[nodiscard]] std::vector<UnstablePlaces> news() { return watch_.news(); }
+  [[nodiscard]] std::vector<PassedPoses::Place> places() { return watch_.places(); }
+  [[nodiscard]] PosesSummary summary() { return watch_.summary(); }
+
+ private:
+  void follow_timestep(const CycleRecord& record);
+  void follow_lateness(const CycleRecord& record);
+  void pass(const CycleRecord& record);
+  [[nodiscard]] LoopModel judged_loop() const;
+
+  const command_line::PreparedSession& session_;
+  const command_line::RunOptions& options_;
+  const SignalDeriver& deriver_;
+  PoseWatch watch_;
+  LoopModel loop_;  // of the present timestep, with samples that are in time
+  std::int64_t period_ns_ = 0;
+  double late_share_ = 0.0;  // of the sensor's samples, lately
+  bool samples_late_ = false;
+  double user_damping_Ns_per_m_ = 0.0;  // without what passivity adds
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,54 @@
+// What a session in a program of one's own leaves in files, as `proxarm run` does: the record, the plot, and the black
+// box after a fault. Each only where its option is given.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string_view>
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/library/black_box_files.hpp"
+#include "controller/library/recorded_messages.hpp"
+#include "controller/record/black_box.hpp"
+#include "controller/record/replay_log.hpp"
+#include "controller/report/plot.hpp"
+#include "controller/report/session_record.hpp"
+#include "controller/report/summary.hpp"
+#include "controller/signals/derived_signals.hpp"
+
+namespace proxarm::controller {
+
+// Throws SetupError where a plot can't be written to the file that --plot names. Empty: none is named.
+void require_plot_file(const std::filesystem::path& file);
+
+class SessionFiles {
+ public:
+  // Makes the record's folder; throws SetupError. A session with parts of one's own has no replay, which is made of
+  // files alone. The others must outlive this.
+  SessionFiles(const command_line::PreparedSession& session, const command_line::RunOptions& options,
+               const BlackBox& box, Replay replay);
+
+  [[nodiscard]] bool keeps_frames() const noexcept { return writer_ != nullptr; }
+  void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
+  // The record of the cycle that has just ended, with what the scene knows.
+  void add(const CycleRecord& completed);
+  // Writes all; the summary gets the black box's folder. Throws SetupError.
+  void finish(Summary& summary);
+
+ private:
+  void write_box(Summary& summary) const;
+  void draw(const Summary& summary) const;
+
+  const command_line::PreparedSession& session_;
+  const command_line::RunOptions& options_;
+  const BlackBox& box_;
+  Replay kept_replay_;
+  ReplayHead head_;
+  SignalDeriver deriver_;
+  std::unique_ptr<SessionWriter> writer_;
+  std::unique_ptr<ReplayRecorder> replay_;
+  std::unique_ptr<RecordedMessages> messages_;
+  std::unique_ptr<PlotBuilder> plot_;
+};
+
+}  // namespace proxarm::controller
