@@ -11,6 +11,7 @@
 #include "models/arm/arm.hpp"
 #include "models/description/cell.hpp"
 #include "models/description/hand.hpp"
+#include "models/description/modbus_drive.hpp"
 #include "scenes/format/scene.hpp"
 
 namespace proxarm::controller {
@@ -19,6 +20,9 @@ namespace proxarm::controller {
 std::vector<std::string> cell_doubts(const description::Cell& cell, const models::Arm& arm);
 
 std::vector<std::string> hand_doubts(const description::HandDescription& hand);
+
+// Of a register map: numbers that a manual counts from 40001.
+std::vector<std::string> register_doubts(const description::ModbusDriveDescription& drive);
 
 // start_W: where the tool is at the start, m. reach_m: how far no point of the arm is from its base.
 std::vector<std::string> scene_doubts(const scenes::Scene& scene, const models::Vec3& start_W, double reach_m);
