@@ -12,7 +12,11 @@ namespace {
 std::string number(double x) {
   char text[32];
   std::snprintf(text, sizeof text, "%.7g", x);
-  return text;
+  // Some readers of YAML, such as PyYAML, take 5e-05 for a text.
+  std::string number = text;
+  const std::size_t exponent = number.find('e');
+  if (exponent != std::string::npos && number.find('.') == std::string::npos) number.insert(exponent, ".0");
+  return number;
 }
 
 // A name out of a URDF, which may have any characters: quoted where YAML would take it for something else.
