@@ -15,6 +15,7 @@
 #include "controller/library/led_poses.hpp"
 #include "controller/library/session_files.hpp"
 #include "controller/library/session_summary.hpp"
+#include "controller/report/latency.hpp"
 
 namespace proxarm {
 
@@ -64,12 +65,14 @@ class OneRun {
   controller::SimulatedLoop loop_;
   controller::SessionFiles files_;
   controller::SummaryBuilder builder_;
-  controller::SignalDeriver deriver_;
   std::optional<controller::LedPoses> poses_;
   std::optional<command_line::ControlHandlers> handlers_;
   controller::SessionTally tally_;
   std::int64_t rendered_ns_ = 0;
-  SteadyClock::duration figures_{}, wall_{};
+  struct {
+    SteadyClock::duration figures{}, wall{};
+    controller::LatencyHistogram wake_up;
+  } took_;
 };
 
 controller::Replay replay_of(const controller::OwnParts& own) {
@@ -85,9 +88,8 @@ OneRun::OneRun(const PreparedSession& session, const RunOptions& options, const 
       box_(controller::box_size(session, true).period_s, controller::box_size(session, true).frames_per_cycle),
       loop_(session, own, {.arm = &arm_, .faults = options.faults, .enabling = options.enabling}),
       files_(session, options, box_, replay_of(own)),
-      builder_(controller::summary_config(session)),
-      deriver_(session.cell) {
-  if (!session.impedance()) poses_.emplace(session, options, deriver_);
+      builder_(controller::summary_config(session)) {
+  if (!session.impedance()) poses_.emplace(session, options, files_.deriver());
   if (files_.keeps_frames()) {
     loop_.network().set_observer(
         [this](const fieldbus::WireFrame& wire) { files_.add_frame(wire.bus_name, wire.frame, wire.end_ns); });
@@ -105,10 +107,11 @@ void OneRun::run(const LookAtRecord& each, const std::function<void()>& before) 
   tally_ = loop_.run([&](const CycleRecord& record, const sim::Truth& truth) { look(record, truth, each); },
                      controller::session_length(session_, options_),
                      [&](std::int64_t) {
+                       took_.wake_up.add(loop_.network().woken_late_ns());
                        if (loop_.exploded_after_s()) cycle().request_stop();
                        before();
                      });
-  wall_ = SteadyClock::now() - begun;
+  took_.wall = SteadyClock::now() - begun;
   if (loop_.exploded_after_s()) controller::refuse_explosion(*loop_.exploded_after_s());
 }
 
@@ -122,7 +125,7 @@ void OneRun::look(CycleRecord record, const sim::Truth& truth, const LookAtRecor
   builder_.add(record);
   if (poses_) poses_->add(record);
   files_.add(record);
-  figures_ += SteadyClock::now() - completes;
+  took_.figures += SteadyClock::now() - completes;
   if (each) each(record);
 }
 
@@ -140,10 +143,11 @@ Summary OneRun::summary() {
   controller::add_idle_orders(summary, cycle(), options_);
   summary.expected_swing = command_line::slowest_swing(session_);
   if (poses_) summary.poses = poses_->summary();
-  summary.wall_time_s = std::chrono::duration<double>(wall_).count();
-  summary.figures_s = std::chrono::duration<double>(figures_).count();
+  summary.wall_time_s = std::chrono::duration<double>(took_.wall).count();
+  summary.figures_s = std::chrono::duration<double>(took_.figures).count();
   summary.overruns = tally_.overruns;
   summary.virtual_time = options_.pace != command_line::Pace::realtime;
+  if (!summary.virtual_time) summary.latency_us["wake_up"] = controller::latency_summary(took_.wake_up);
   if (loop_.first_cycle_ns()) summary.first_cycle_s = 1e-9 * static_cast<double>(*loop_.first_cycle_ns());
   summary.bus_load = loop_.bus_load();
   files_.finish(summary);

@@ -28,6 +28,7 @@ class SessionFiles {
   SessionFiles(const command_line::PreparedSession& session, const command_line::RunOptions& options,
                const BlackBox& box, Replay replay);
 
+  [[nodiscard]] const SignalDeriver& deriver() const noexcept { return deriver_; }
   [[nodiscard]] bool keeps_frames() const noexcept { return writer_ != nullptr; }
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
   // The record of the cycle that has just ended, with what the scene knows.

@@ -123,6 +123,7 @@ class Options(ProgramTest):
                     began = time.monotonic()
                     self.of_a_session(whole)
                     self.assertGreater(time.monotonic() - began, whole["duration"])
+                    self.assertGreater(proxarm.Session(**whole).run().summary["latency_us"]["wake_up"]["max"], 0)
 
     def test_a_simulated_arm_that_is_another_one(self):
         arm = self.changed("models/cells/default.yaml", ("gear_stiffness_Nm_per_rad: 115000", "gear_stiffness_Nm_per_rad: 80000"))
