@@ -15,46 +15,46 @@ using models::Vec3;
 
 namespace {
 
-// The share of a joint's speed that the proxy's step may use; the rest is for the gears' twist.
+// Share of a joint's speed for the proxy's step; the rest is for the gears' twist.
 constexpr double speed_share = 0.95;
-// The share of a joint's acceleration, behind the filter, that the step may use, and of that of braking, likewise.
+// Shares of a joint's acceleration: behind the filter, for braking, and behind the filter in a reduced box.
 constexpr double acceleration_share = 1.0, braking_share = 0.5, eased_share = 0.9;
-// The share of the elbow's speed limit; gears add some 7 % where a hand pulls the arm along at the limit.
+// Share of the elbow's speed limit; gears add some 7 % when a hand pulls the arm along at the limit.
 constexpr double elbow_share = 0.9;
-// The cost of a joint's step beside that of turning, as (joint speed / its limit)² of (rad/s)²: damps turning where the
-// wrist is nearly singular, to σ = 0.03 rad/rad.
+// Cost of a joint's step beside turning: (joint speed / its limit)² counts as this many (rad/s)². Damps turning near a
+// wrist singularity, to σ = 0.03 rad/rad.
 constexpr double joint_cost = 1e-3;
-// Arms with fewer than six axes turn the tool as little as they can: a radian of it counts ten of a joint, as in
-// prioritized_step.hpp.
+// Arms with fewer than six axes turn the tool as little as possible: 1 rad of turning costs as much as 10 rad of a
+// joint, as in prioritized_step.hpp.
 constexpr double few_axes_turning = 100.0;
-// What turning and joints' steps cost where the nearest place is looked for, in m²/rad²: it is off by 1e-10 m where
-// turning lags by a milliradian.
+// Cost of turning and joint steps in the search for the nearest place, in m²/rad²: with a turning lag of a milliradian
+// the place is off by 1e-10 m.
 constexpr double beside_place = 1e-7;
-// A place within this counts as reached: a tenth of what encoders resolve at a metre.
+// A place within this distance is reached: a tenth of the encoders' resolution at a metre.
 constexpr double reached_m = 1e-9;
 constexpr double place_tolerance_m = 1e-12;
-// A step that leaves a curved set by less, in m or rad, is within it: 1 µm/s at 1 ms.
+// A step outside a curved set by less than this, in m or rad, counts as inside: 1 µm/s at 1 ms.
 constexpr double set_tolerance = 1e-9;
-// The least time in which borders of turning and of the place's margin are approached. It is that of the longest
-// braking otherwise: a border that is approached by the present braking time is passed if joints get faster before it.
+// Shortest time in which borders of turning and place are approached. Otherwise it is the longest braking time; with
+// the present braking time, joints that get faster would pass the border.
 constexpr double approach_s = 0.1;
-// How a held orientation that lags catches up: with this time constant at the end, and this acceleration and share of
-// the turning speed's limit before. A handle's end, 0.1 m away, is accelerated by 0.5 m/s² then.
+// A held orientation that lags catches up with this time constant at the end; before that with this acceleration, up to
+// this share of the turning speed limit. The end of a handle, 0.1 m away, then accelerates at 0.5 m/s².
 constexpr double catching_s = 0.1, catching_rad_per_s2 = 5.0, catching_share = 0.25;
-// A lag that is caught up in one step: 1 µm at a metre.
+// A lag that one step may close: 1 µm at a metre.
 constexpr double caught_up_rad = 1e-6;
-// How the change of a joint's step that is tried grows, and from where on it is U's whole box.
+// Growth of the tried change of a joint's step; from whole_box on, U's whole box is used.
 constexpr double first_ease = 1.0, next_ease = 4.0, whole_box = 256.0;
-// The wrist is nearly singular where the sine of the middle one of its angles is less.
+// The wrist is nearly singular below this sine of its middle angle.
 constexpr double near_singular = 0.3;
 constexpr int most_rounds = 8;
-constexpr int bisections = 8;        // of the way from braking to a step: to 0.4 % of it
-constexpr double coming_back = 0.1;  // of what braking is beyond the sets of turning
-constexpr double alike = 1e-3;       // of half-spaces' normals: the sine of the angle between them
+constexpr int bisections = 8;        // between braking and a step: to 0.4 % of the way
+constexpr double coming_back = 0.1;  // share of braking's distance beyond the sets of turning
+constexpr double alike = 1e-3;       // half-spaces are alike below this sine between their normals
 constexpr double rounding_rad = 1e-12;
-constexpr std::size_t first_point = 2;  // the first joint whose place is limited; the two before it hardly move
+constexpr std::size_t first_point = 2;  // first joint with a speed limit of its place; the two before hardly move
 
-// The inverse of fastest_to_rest(): the speed to start with so that it stays within `most`.
+// Inverse of fastest_to_rest(): highest initial speed that stays within `most`.
 double fastest_start(double B, double most) noexcept {
   return B <= most ? most : std::max(0.0, 2.0 * std::sqrt(B * most) - B);
 }
@@ -126,7 +126,7 @@ void ArmStep::begin(const ArmStepStart& start) noexcept {
   if (start.held && eases_) turn_gently();
 }
 
-// A held orientation that lags is caught up as a brake reaches a wall, and no faster at once than joints take it up.
+// A held orientation that lags is caught up like a brake approaches a wall, and speeds up only as fast as joints can.
 void ArmStep::aim(const Eigen::Quaterniond& R_WT) noexcept {
   start_.R_WT = aim_ = R_WT;
   asked_ = catches_up_ = false;
@@ -151,10 +151,10 @@ double ArmStep::room_rad(std::size_t i, double sign) const noexcept {
   return std::max(0.0, joints_[i].share * to_end);
 }
 
-// Accelerations bound the step where it doesn't brake; ranges and speeds bound braking, too.
+// Accelerations bound a step that doesn't brake; ranges and speeds bound braking, too.
 void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
   const double T = period_s_;
-  double cycles = 0.0;  // that the slowest joint needs to brake
+  double cycles = 0.0;  // braking time of the slowest joint
   for (Eigen::Index i = 0; i < step_rad_.size(); ++i) {
     const double a = joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
     cycles = std::max(cycles, std::abs(step_rad_[i]) / (braking_share * a * T * T));
@@ -175,7 +175,7 @@ void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
   }
 }
 
-// The step along the last one that brakes as hard as the box allows: often to rest at once, since the filter follows.
+// The hardest braking along the last step that the box allows: often to rest at once, since the filter follows.
 JointVector ArmStep::hardest_braking() const noexcept {
   double share = 0.0;
   for (Eigen::Index i = 0; i < step_rad_.size(); ++i) {
@@ -185,16 +185,16 @@ JointVector ArmStep::hardest_braking() const noexcept {
   return (std::min(1.0, share) * step_rad_).cwiseMax(whole_.low).cwiseMin(whole_.high);
 }
 
-// A hand that turns a point changes its turning no faster than joints take it up. One box for entering and for leaving
-// that limit: with a smaller one for leaving, the tool swung between the two at 16 Hz.
+// If a hand turns a point tool, turning changes only as fast as joints can. One box serves for entering and leaving
+// that limit: with a smaller one for leaving, the tool oscillated between the two at 16 Hz.
 bool ArmStep::eases() const noexcept {
   return lags_ || (start_.held ? near_wrist_singularity() : !start_.touches_turning);
 }
 
 void ArmStep::use_first_box() noexcept { use_box(eases_ ? first_ease : whole_box); }
 
-// Where a held orientation gives way to the place, the joints that only turn the tool stay gentle, whatever the place
-// asks of the others. (One that a hand turns may be anywhere: there they may be asked to stop at once.)
+// Joints that only turn the tool keep to the reduced box while a held orientation gives way to the place. (If a hand
+// turns the tool, they may have to stop at once.)
 void ArmStep::turn_gently() noexcept {
   for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
     if (margin_.carries(i)) continue;
@@ -234,13 +234,13 @@ bool ArmStep::Box::contains(const JointVector& u) const noexcept {
   return (u.array() >= low.array() - rounding_rad).all() && (u.array() <= high.array() + rounding_rad).all();
 }
 
-// How far σ may fall in this step: towards its border as towards any other, and never below what braking makes of it.
+// Allowed decrease of σ in this step: as towards any border, but at least the decrease by braking.
 double ArmStep::place_bound(const PlaceMargin::Border& border) const noexcept {
   const double share = period_s_ / (period_s_ + brakes_s_);
   return std::max(std::max(0.0, share * (border.value - margin_.least())), least(-border.gradient));
 }
 
-// `u` is the step to the inverse kinematics' solution.
+// `u`: step to the solution of the inverse kinematics.
 bool ArmStep::allows(const JointVector& u) const noexcept {
   if (!box_.contains(u)) return false;
   for (const PlaceMargin::Border& border : margin_.near()) {
@@ -249,14 +249,14 @@ bool ArmStep::allows(const JointVector& u) const noexcept {
   return !points_too_fast(u, &solution_.kinematics);
 }
 
-// On the way to rest, all joints braking together, a point of speed V gets no faster than (V + B)²/4B, with
-// B = t |u̇|ᵀC|u̇| and t the time that this takes; V if B ≤ V (tool_guard.hpp has the derivation). This is B.
+// While all joints brake together to rest, a point of speed V gets no faster than (V + B)²/4B, with B = t |u̇|ᵀC|u̇|
+// and t the braking time; V if B ≤ V (derived in tool_guard.hpp). Returns B.
 double ArmStep::growth_m_per_s(const JointVector& u) const noexcept {
   const JointVector rate = u.cwiseAbs() / period_s_;
   return braking_of(slowest_to_brake(rate), rate) * rate.dot(curvature_.lazyProduct(rate));
 }
 
-// The gradient of growth_m_per_s() by u, m/s per rad.
+// Gradient of growth_m_per_s() by u, m/s per rad.
 JointVector ArmStep::growth_gradient(const JointVector& u) const noexcept {
   const JointVector rate = u.cwiseAbs() / period_s_, bent = curvature_ * rate;
   const Eigen::Index slowest = slowest_to_brake(rate);
@@ -266,7 +266,7 @@ JointVector ArmStep::growth_gradient(const JointVector& u) const noexcept {
   return out;
 }
 
-// The time that this joint needs to brake from its speed, and the joint that needs the longest.
+// Braking time of this joint; and the joint with the longest.
 double ArmStep::braking_of(Eigen::Index i, const JointVector& rad_per_s) const noexcept {
   return rad_per_s[i] / joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
 }
@@ -279,8 +279,8 @@ Eigen::Index ArmStep::slowest_to_brake(const JointVector& rad_per_s) const noexc
   return slowest;
 }
 
-// A point moves by at most Σ R_i |u_i|, R_i being the distance of T from axis i at most: many steps are below that.
-// `known`: the kinematics after the step, if they are.
+// A point moves by at most Σ R_i |u_i|, R_i: largest distance of T from axis i. Most steps are below the limit by this
+// bound. `known`: kinematics after the step, or null.
 bool ArmStep::points_too_fast(const JointVector& u, const models::ToolKinematics* known) const noexcept {
   const double B = growth_m_per_s(u), T = period_s_;
   const double tool_m_per_s = elbow_share * start_.tool_m_per_s, elbow_m_per_s = elbow_share * start_.elbow_m_per_s;
@@ -289,7 +289,7 @@ bool ArmStep::points_too_fast(const JointVector& u, const models::ToolKinematics
   models::ToolKinematics after;
   if (known == nullptr) arm_->kinematics(link_rad_ + u, after);
   const models::ToolKinematics& to = known != nullptr ? *known : after;
-  // Where braking makes T no faster, its own set bounds it (step_limits.hpp).
+  // If braking makes T no faster, the speed ball bounds it (step_limits.hpp).
   if (B > tool_m_per_s && (to.X_WT.translation() - from_.X_WT.translation()).norm() > tool_m + set_tolerance) {
     return true;
   }
@@ -299,7 +299,7 @@ bool ArmStep::points_too_fast(const JointVector& u, const models::ToolKinematics
   return false;
 }
 
-// ---- the proxy asks
+// ---- queries of the proxy
 
 bool ArmStep::contains(const Vec3& q_W) noexcept {
   models::Pose X_WT = models::Pose::Identity();
@@ -317,7 +317,7 @@ bool ArmStep::contains(const Vec3& q_W) noexcept {
 bool ArmStep::cut(const Vec3& q_W, const Vec3& q_k1_W, LimitPlane<3>& out) noexcept {
   if (!linearised_) start_model();
   use_box(whole_box);
-  // J_w u = `wanted` carries the wrist to where the tool at q_W has it.
+  // J_w u = `wanted` carries the wrist to its place with the tool at q_W.
   const Vec3 here_W = model_.at.X_WT.translation() + wrist_.from_T_W;
   const auto wanted_for = [&](const Vec3& from_T_W) { return q_W + from_T_W - here_W + wrist_.J_W * model_.u; };
   Vec3 wanted = wanted_for(wrist_wanted_W_) - wrist_.by_turning_W * turn_from(model_, aim_);
@@ -358,7 +358,7 @@ void ArmStep::start_model() noexcept {
   linearised_ = true;
 }
 
-// The rotation vector from the model's orientation to R.
+// Rotation vector from the model's orientation to R.
 Vec3 ArmStep::turn_from(const Model& model, const Eigen::Quaterniond& R) const noexcept {
   const Eigen::Quaterniond here = Eigen::Quaterniond(model.at.X_WT.linear()).normalized();
   return models::rotation_vector(R * here.conjugate());
@@ -392,17 +392,17 @@ void ArmStep::add_sets() noexcept {
   for (std::size_t k = 0; k < row_count_; ++k) add_set(rows_[k].a, rows_[k].b, rows_[k].limit);
 }
 
-// The least of a·u in the box.
+// Minimum of a·u in the box.
 double ArmStep::least(const JointVector& a) const noexcept {
   return (a.array() * (a.array() > 0.0).select(whole_.low, whole_.high).array()).sum();
 }
 
-// Takes in a·u ≤ b, widened to contain what the joints can still do. Whether that excludes this step: a set that is
-// left by braking, too, or by the curvature of a way along its border, holds nothing back.
+// Adds a·u ≤ b, widened to what the joints can still do. Returns whether this excludes `step`. It doesn't if braking
+// leaves the set as well, or if only the curvature along the border does.
 bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVector& step) noexcept {
   const Row row{a, std::max(b, least(a)), limit};
   if (a.dot(step) <= row.b + set_tolerance) return false;
-  // Linearised anew: two rows that are nearly parallel would lose the program's digits.
+  // A nearly parallel row is replaced: two of them would lose the program's digits.
   for (std::size_t k = 0; k < row_count_; ++k) {
     if (rows_[k].limit != limit || (rows_[k].a - a).norm() > alike * a.norm()) continue;
     rows_[k] = row;
@@ -412,7 +412,7 @@ bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVe
   return true;
 }
 
-// The half-space that this step is furthest within.
+// The half-space in which this step has the most room.
 std::size_t ArmStep::slackest_row(const JointVector& step) const noexcept {
   std::size_t slackest = 0;
   double most = 0.0;
@@ -426,7 +426,7 @@ std::size_t ArmStep::slackest_row(const JointVector& step) const noexcept {
   return slackest;
 }
 
-// The step with J u = `wanted` that turns the tool as far as U allows. False if U doesn't contain one.
+// The step with J u = `wanted` that turns the tool as far as U allows. False if U has none.
 bool ArmStep::solve_at(const Model& model, const Rows& J, const Vec3& wanted) noexcept {
   JointMatrix H;
   JointVector g;
@@ -453,7 +453,7 @@ bool ArmStep::solve_near(const Model& model, const Rows& J, const Vec3& wanted) 
   return program_.solve();
 }
 
-// The rotation vector by which u turns the tool beyond the sets of turning.
+// Rotation vector by which u turns the tool beyond the sets of turning.
 Vec3 ArmStep::turned_beyond(const Model& model, const JointVector& u) const noexcept {
   if (!inverse_->reaches_orientation()) return Vec3::Zero();
   const auto J_R = model.at.J_W.bottomRows<3>();
@@ -465,7 +465,7 @@ Vec3 ArmStep::turned_beyond(const Model& model, const JointVector& u) const noex
   return models::rotation_vector(to * within.conjugate());
 }
 
-// Takes in the half-spaces of curved sets that u has left. Whether there was one.
+// Adds half-spaces for the curved sets that u leaves. Returns whether it leaves any.
 bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexcept {
   bool leaves = false;
   const Vec3 beyond = turned_beyond(model, u);
@@ -477,9 +477,9 @@ bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexce
   return (points_too_fast(u, nullptr) && limit_points(model, u)) || leaves;
 }
 
-// Half-spaces come near to a curved set in ever smaller steps. What is left is taken back towards braking, which leaves
-// no set that can be kept. Where braking leaves that of turning, too, a step that comes back into it is taken: a tool
-// that stood a little beyond its limit would stay there for good.
+// Half-spaces approach a curved set in ever smaller steps. A remaining excess is removed by moving towards braking,
+// which leaves no set that can be kept. If braking also leaves the set of turning, a step that returns into it is
+// accepted: otherwise a tool slightly beyond its limit would stay there.
 JointVector ArmStep::taken_back(const Model& model, const JointVector& u) const noexcept {
   const double most = std::max(set_tolerance, coming_back * turned_beyond(model, brakes_).norm());
   const auto leaves = [&](const JointVector& tried) {
@@ -494,7 +494,7 @@ JointVector ArmStep::taken_back(const Model& model, const JointVector& u) const 
   return brakes_ + kept * (u - brakes_);
 }
 
-// B changes with u, too, so the half-space is that of the linearised (V + B)²/4B, with
+// B changes with u, so the half-space is that of the linearised (V + B)²/4B, with
 //   ∂/∂V = (V + B)/2B,   ∂/∂B = (B² − V²)/4B²,   ∂B/∂u̇ = 2t C|u̇| sgn u̇ + |u̇|ᵀC|u̇| ∂t/∂u̇
 bool ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
   models::ToolKinematics at;
@@ -503,7 +503,7 @@ bool ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
   const double B = growth_m_per_s(u), T = period_s_;
   const JointVector B_u = growth_gradient(u);
   bool leaves = false;
-  // A joint's origin moves by the joints before it alone.
+  // A joint's origin moves only with the joints before it.
   const auto limit = [&](const Vec3& from_W, const Vec3& to_W, std::size_t joints, double most_m_per_s) {
     const Vec3 way = to_W - from_W;
     const double length = way.norm(), V = length / T, beyond = fastest_to_rest(V, B) - most_m_per_s;
@@ -560,7 +560,7 @@ ArmStep::Outcome ArmStep::go(const Vec3& q_W, const Eigen::Quaterniond& R_WT) no
   return catches_up_ ? Outcome::lags : Outcome::reached;
 }
 
-// Newton's method on the place, each time by the program of the tool linearised where the last one ended.
+// Newton's method on the place; each program uses the tool linearised at the last solution.
 ArmStep::Outcome ArmStep::go_limited(const Vec3& x_W) noexcept {
   if (!linearised_) start_model();
   use_box(first_ease);

@@ -1,34 +1,31 @@
-// One step of the arm, from where it is sent to where it will be sent: the joints' step u as the unknown, and all that
-// the arm can't do as sets of it.
+// One step of the arm: finds the joints' step u that brings the tool nearest to a wanted pose, within all limits of
+// joints and tool.
 //
 //   minimise |x(u) − x_d|², and then |R(u) ⊟ R_d|²,   where u ∈ U
-// x, R: the tool's pose by exact kinematics at c(k−1) + u, with c the links' angles before the setpoints' filter. The
-// sets of U:
-//   box      low ≤ u ≤ high: each joint's range with room to brake, its speed, and its acceleration behind the filter.
-//            The filter's input may therefore jump, as it does at a wall. Where turning may have to give way (near a
-//            wrist's singularity, while it lags, and where a hand turns the tool) steps keep to half of the
-//            acceleration before the filter, too, if the place allows it; of an orientation that is held, those of the
-//            joints that only turn the tool always. Motors lead the links that they accelerate, and can't follow what
-//            jumps at a wrist
-//   place    −∇σ·u ≤ b: distance from the poses in which the place is lost (place_margin.hpp)
+// x, R: the tool's pose by exact kinematics at c(k−1) + u; c: the link angles before the setpoint filter. The sets of
+// U:
+//   box      low ≤ u ≤ high: each joint's range with room to brake, speed, and acceleration behind the filter. The
+//            filter's input may therefore jump, as it does at a wall. But near a wrist singularity, during a turning
+//            lag and while a hand turns the tool, steps also keep half of the acceleration before the filter, unless
+//            the place needs more. With a held orientation, joints that only turn the tool always do: their motors lead
+//            the links that they accelerate and can't follow jumps at a wrist.
+//   place    −∇σ·u ≤ b: distance from singular poses (place_margin.hpp)
 //   points   |p(u) − p(0)| ≤ vT for elbow and wrist, also while all joints brake from there (growth_m_per_s())
-//   turn     the sets of turning (turn_sets.hpp); of an orientation that is held, how far it may lag
-// Place and turn are borders: they are approached no faster than joints can brake. All but the box are curved, and
-// taken in as half-spaces where a solution has left them.
+//   turn     the sets of turning (turn_sets.hpp); for a held orientation, its allowed lag
+// Place and turn are borders, approached no faster than joints can brake. All sets but the box are curved; a half-space
+// is added for each one that a solution has left.
 //
-// Place comes before orientation. Where the wrist's joints have not enough left to turn the tool (a wrist's
-// singularity), it turns later, and what it lags by is bounded by the sets of turning. But a tool isn't tilted to reach
-// further: where the joints that carry the wrist have not enough left, the place gives way. So the places that can be
-// followed (FollowableStep) are those to which these joints can carry the wrist with the tool turned as wanted, or,
-// where it turns freely, as braking turns it: turning gives way first. The proxy's next place is one of them: q(k) is
-// where the arm is sent.
+// Position has priority over orientation. Near a wrist singularity, joints that can't turn the tool fast enough turn it
+// later; the sets of turning bound that lag. But the tool isn't tilted to reach further: if the joints that carry the
+// wrist can't go on, the position gives way. So the followable places (FollowableStep) are those to which these joints
+// can carry the wrist with the tool in its wanted orientation, or, if it turns freely, in that of braking. The proxy's
+// next place is one of them: the arm is sent to q(k).
 //
-// Each half-space is widened to what the joints can still do, so U is never empty for one of them alone; where several
-// exclude each other, the joints brake together as hard as they can. A force of U's normal cone has f·(u − u_b) ≤ 0 for
-// any step u_b of U: a limit never drives the arm beyond what braking would. That is what lets an arm come back that
-// was led where it can't go.
+// Each half-space is widened to what the joints can still do, so each single one leaves U nonempty. If several exclude
+// each other, all joints brake together as hard as they can. A force in U's normal cone has f·(u − u_b) ≤ 0 for any
+// step u_b of U: a limit never moves the arm further than braking would, so the arm can return from beyond a limit.
 //
-// A step that no set touches is that of the inverse kinematics, to the bit. Neither allocates, locks nor throws after
+// If no set is active, the step is that of the inverse kinematics, to the bit. No allocation, lock or throw after
 // construction.
 #pragma once
 
@@ -47,16 +44,15 @@
 
 namespace proxarm::controller {
 
-// What a step depends on beside the arm's own history. Angles of the links, in rad; the setpoints' filter as
-// elastic_setpoint.hpp has it.
+// Inputs of a step beside the arm's own history. Link angles in rad; filter as in elastic_setpoint.hpp.
 struct ArmStepStart {
-  models::JointVector coasting_rad;                // the filter's input for which its output keeps its speed
-  double input_s2 = 0.0;                           // by how much another input is off from that, for each rad/s²
-  models::JointVector twist_rad;                   // by how much each motor is ahead of its link
-  double tool_m_per_s = 0.5, elbow_m_per_s = 0.5;  // speed limits of T, and of elbow and wrist
-  Eigen::Quaterniond R_WT = Eigen::Quaterniond::Identity();  // the orientation that is wanted
-  bool held = true;                                          // it stays the same: what lags is caught up slowly
-  bool touches_turning = false;  // contacts turn the tool, so its turning may change at once (a tool with a shape)
+  models::JointVector coasting_rad;                          // filter input for which the output keeps its speed
+  double input_s2 = 0.0;                                     // distance from it of another input, per rad/s²
+  models::JointVector twist_rad;                             // lead of each motor over its link
+  double tool_m_per_s = 0.5, elbow_m_per_s = 0.5;            // speed limits of T, and of elbow and wrist
+  Eigen::Quaterniond R_WT = Eigen::Quaterniond::Identity();  // the wanted orientation
+  bool held = true;                                          // R_WT stays the same, and a lag is caught up slowly
+  bool touches_turning = false;                              // contacts of a shaped tool may change its turning at once
   TurnSets turn{};
 };
 
@@ -66,13 +62,13 @@ class ArmStep final : public FollowableStep {
   ArmStep(const models::Arm& arm, const models::InverseKinematics& inverse,
           const std::vector<description::DriveDescription>& drives, double period_s);
 
-  // In which all joints together brake from any speed, and in which the borders of curved sets are approached.
+  // Time in which all joints brake together from any speed; borders of curved sets are approached with it.
   [[nodiscard]] static double braking_s(const std::vector<description::DriveDescription>& drives) noexcept;
 
   void set_period(double period_s) noexcept;
-  // At rest at these angles of the links.
+  // Starts at rest at these link angles.
   void start(const models::JointVector& link_rad) noexcept;
-  // The drives couldn't follow: the motion goes on from here with this step.
+  // The drives couldn't follow: continues from here with this step.
   void resume(const models::JointVector& link_rad, const models::JointVector& step_rad) noexcept;
 
   // Makes the sets of the next step.
@@ -83,10 +79,10 @@ class ArmStep final : public FollowableStep {
   enum class Outcome : std::uint8_t {
     reached,  // place and orientation
     lags,     // the place; the tool turns later
-    held,     // the place nearest to it that can be followed
+    held,     // the nearest place that can be followed
     invalid,  // the pose isn't finite; nothing has changed
   };
-  // Takes the step towards this pose. Precondition: begin() was called for it.
+  // Moves towards this pose. Precondition: begin() was called for this step.
   Outcome go(const models::Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept;
 
   [[nodiscard]] const models::JointVector& link_rad() const noexcept { return link_rad_; }
@@ -94,7 +90,7 @@ class ArmStep final : public FollowableStep {
   // The tool at link_rad().
   [[nodiscard]] const models::ToolKinematics& kinematics() const noexcept { return solution_.kinematics; }
   [[nodiscard]] Eigen::Quaterniond R_WT() const noexcept;
-  // The limits that held the last step.
+  // Limits that held the last step.
   [[nodiscard]] const ActiveLimits& active() const noexcept { return active_; }
   [[nodiscard]] std::uint64_t programs() const noexcept { return programs_; }  // quadratic programs solved so far
   [[nodiscard]] int iterations() const noexcept { return solution_.iterations; }
@@ -103,15 +99,15 @@ class ArmStep final : public FollowableStep {
  private:
   struct Joint {
     double lower_rad, upper_rad, speed_rad_per_s, acceleration_rad_per_s2;
-    double per_step_rad, share;  // of the period: what it may turn, and what share of the way to its range's end
+    double per_step_rad, share;  // per period: maximum step; share of the way to the range's end
   };
-  // A half-space a·u ≤ b in which a solution was found to leave a curved set.
+  // Half-space a·u ≤ b, added because a solution left a curved set.
   struct Row {
     models::JointVector a;
     double b;
     Limit limit;
   };
-  // The tool around the step u, linearised: x(u') ≈ x + J_p (u' − u), and likewise the rotation.
+  // The tool around the step u, linearised: x(u') ≈ x + J_p (u' − u), and the same for the rotation.
   struct Model {
     models::JointVector u;
     models::ToolKinematics at;
@@ -169,29 +165,29 @@ class ArmStep final : public FollowableStep {
   double period_s_ = 0.0;
   double brakes_s_;  // braking_s()
 
-  // Its history.
+  // History.
   models::JointVector link_rad_, step_rad_;
   bool lags_ = false;
-  double catching_rad_per_s_ = 0.0;  // how fast a held orientation that lags catches up
+  double catching_rad_per_s_ = 0.0;  // speed at which a held orientation catches up
 
-  // Of this step.
+  // This step.
   ArmStepStart start_;
-  models::JointVector brakes_;   // all joints brake together, by half of their acceleration
-  Box whole_, box_;              // U's, and the part of it that is used
-  bool eases_ = false;           // the first part that is tried is a small one: eases()
-  double ease_ = 0.0;            // of that part: by how many times half of its acceleration a joint's step may change
+  models::JointVector brakes_;   // all joints brake together, at half of their acceleration
+  Box whole_, box_;              // U's box, and the part in use
+  bool eases_ = false;           // a small part is tried first: eases()
+  double ease_ = 0.0;            // of that part: allowed change of a joint's step, in halves of its acceleration
   models::ToolKinematics from_;  // at c(k−1)
-  models::InverseKinematicsResult solution_;  // of the pose last asked for; after the step, of where it led
+  models::InverseKinematicsResult solution_;  // of the last queried pose; after the step, of its end
   models::Vec3 asked_W_ = models::Vec3::Zero();
-  Eigen::Quaterniond aim_ = Eigen::Quaterniond::Identity();  // what the step turns to: R_WT, or part of the way there
+  Eigen::Quaterniond aim_ = Eigen::Quaterniond::Identity();  // orientation of this step: R_WT, or part of the way there
   bool asked_ = false, allowed_ = false, catches_up_ = false, linearised_ = false;
   Model model_;
   PlaceMargin::Wrist wrist_;                            // by the model
-  models::Vec3 wrist_wanted_W_ = models::Vec3::Zero();  // from T, with the tool turned as wanted
+  models::Vec3 wrist_wanted_W_ = models::Vec3::Zero();  // from T, with the tool in its wanted orientation
   std::array<Row, 16> rows_;
   std::size_t row_count_ = 0;
   models::NearestInPolyhedron program_;
-  std::size_t first_set_ = 0, box_rows_ = 0;  // the first row of the program that is a set of U; those of the box
+  std::size_t first_set_ = 0, box_rows_ = 0;                     // first row of U in the program; rows of the box
   std::array<Limit, models::NearestInPolyhedron::most> kind_{};  // of the rows after the box
   ActiveLimits active_;
   std::uint64_t programs_ = 0;

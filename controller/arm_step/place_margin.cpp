@@ -14,17 +14,17 @@ using models::Vec3;
 namespace {
 
 constexpr double least_m_per_rad = 0.05, share_of_start = 0.5;
-// The gradient is computed below the least σ and this: a tool at 0.5 m/s needs 0.2 s for the way between the two.
+// The gradient is computed for σ below the least one plus this. A tool at 0.5 m/s takes 0.2 s from there.
 constexpr double near_m_per_rad = 0.1;
-// Of the finite differences of J_w, which is exact to 1e-16 m: the error is 1e-6 of ∂J_w/∂c by each of the two causes.
+// Finite differences of J_w, which is exact to 1e-16 m: truncation and rounding each add 1e-6 of ∂J_w/∂c.
 constexpr double nudge_rad = 1e-6;
-// Axes that pass the wrist's origin within this meet there: a URDF's digits of a right angle are off by 1e-9 rad.
+// Axes within this distance of the wrist's origin meet there: digits of a right angle in a URDF are off by 1e-9 rad.
 constexpr double meeting_m = 1e-6;
-// Of the inverse that turns the tool back, rad/rad: where the sine of the wrist's middle angle is less, the tool turns
-// later instead. With 0.03, σ changed so fast there that its border led the tool against the hand.
+// Damping of the inverse that turns the tool back, rad/rad: for a smaller sine of the wrist's middle angle, the tool
+// turns later. With 0.03, σ changed so fast there that its border moved the tool against the hand.
 constexpr double damped_at = 0.3;
 
-// The Jacobian of another point of the tool, at this way from T.
+// Jacobian of the tool's point at from_T_W from T.
 PlaceMargin::Columns jacobian_of(const models::ToolKinematics& at, const Vec3& from_T_W) noexcept {
   PlaceMargin::Columns J = at.J_W.topRows<3>();
   for (Eigen::Index i = 0; i < J.cols(); ++i) J.col(i) += Vec3(at.J_W.col(i).tail<3>()).cross(from_T_W);
@@ -87,7 +87,7 @@ void PlaceMargin::hold_orientation(const models::ToolKinematics& at, Wrist& wris
 }
 
 PlaceMargin::Singular PlaceMargin::singular(const Columns& J) const noexcept {
-  // In the directions in which T can't go, J is zero; a large value there leaves the smallest of the others.
+  // Directions in which T can't move have J = 0; a large value there leaves the smallest of the others.
   models::Mat6 squared = models::Mat6::Identity() * 1e6;
   squared.topLeftCorner<3, 3>() = J * J.transpose();
   for (int k = space_.dimensions; k < 3; ++k) {
@@ -97,7 +97,7 @@ PlaceMargin::Singular PlaceMargin::singular(const Columns& J) const noexcept {
   return {eigen.values.head<3>().cwiseMax(0.0).cwiseSqrt(), eigen.vectors.topLeftCorner<3, 3>()};
 }
 
-// Of three squares λ₁ ≤ λ₂ ≤ λ₃ of singular values, λ₁ ≥ λ₁λ₂λ₃ / ((λ₁ + λ₂ + λ₃)/2)².
+// For squares λ₁ ≤ λ₂ ≤ λ₃ of singular values: λ₁ ≥ λ₁λ₂λ₃ / ((λ₁ + λ₂ + λ₃)/2)².
 bool PlaceMargin::surely_clear(const Columns& J) const noexcept {
   const Mat3 squared = J * J.transpose();
   const double half_sum = 0.5 * squared.trace();
@@ -119,8 +119,8 @@ void PlaceMargin::go_to(const JointVector& c_rad, const models::ToolKinematics& 
   measure(c_rad, wrist(at).J_W);
 }
 
-// dσ = leftᵀ dJ right, right = Jᵀ left / σ. The first joint moves all of the arm as one, and those from the wrist on
-// don't move it where their axes meet: σ stays.
+// dσ = leftᵀ dJ right, right = Jᵀ left / σ. The first joint moves the arm as a whole and doesn't change σ; nor do those
+// from the wrist on, if their axes meet.
 void PlaceMargin::measure(const JointVector& c_rad, const Columns& J) noexcept {
   const Singular now = singular(J);
   from_rad_ = c_rad;

@@ -13,7 +13,7 @@ namespace {
 
 using models::Vec3;
 
-// The spring constants of ISO/TS 15066 lie in this range. 100 N/mm belongs to no body region and fills a gap.
+// The spring constants of ISO/TS 15066 lie in this range. 100 N/mm belongs to no body region but fills a gap.
 constexpr std::array body_stiffnesses_N_per_m{10e3, 25e3, 50e3, 75e3, 100e3, 150e3};
 
 // The worst mobility over the directions of the tool's space.

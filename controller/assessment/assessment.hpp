@@ -1,16 +1,16 @@
-// What a cell's arm does to a person near it, measured on the simulated arm: how far it moves on when it is stopped at
-// full speed, and how hard it presses on something in its way.
+// Assesses on the simulated arm what a cell's arm does to a person near it: how far it moves on when stopped at full
+// speed, and how hard it presses on a body in its way.
 //
 // A trial is a session in virtual time: a hand leads the tool straight along a direction through free space, at the
 // speed that the cell allows. The first trial is undisturbed and shows when the tool is fastest. The others are the
-// same up to that time, at which
-//   the arm is stopped (category 0: power off, brakes close; 1: controlled, then off; 2: controlled, drives stay on),
-//   or a body appears: a one-sided spring across the tool's way, in front of something rigid. It presses
-// on the handle, where the force sensor measures the force, or on the arm before the sensor, where it isn't measured.
-// Trials are run in several poses and in both directions of the three axes of W (of the axes of the tool's space, if an
+// same up to that time; then
+//   the arm is stopped (category 0: power off, brakes close; 1: controlled, then off; 2: controlled, drives stay on)
+//   or a body appears: a one-sided spring across the tool's way, in front of something rigid. It presses on the
+//   handle, where the sensor measures the force, or on the arm before the sensor, where the force isn't measured.
+// Trials run in several poses and in both directions of the three axes of W (of the axes of the tool's space, if the
 // arm has fewer). The worst figures are reported.
 //
-// The simulation uses the values that the cell file has under `simulation:`. It certifies nothing.
+// The simulation uses the cell file's values under `simulation:`. It certifies nothing.
 #pragma once
 
 #include <functional>
@@ -29,7 +29,7 @@ enum class Stop : std::uint8_t { none, category_0, category_1, category_2 };
 
 // The body in the tool's way.
 struct Body {
-  double stiffness_N_per_m = 0.0;  // 0: none
+  double stiffness_N_per_m = 0.0;  // 0: no body
   models::Vec3 surface_W = models::Vec3::Zero(), normal_W = models::Vec3::UnitX();
   bool felt = true;
 };
@@ -38,7 +38,7 @@ struct Trial {
   std::vector<double> start_rad;
   models::Vec3 direction_W = models::Vec3::UnitX();
   Stop stop = Stop::none;
-  double at_s = 0.0;  // since power on: when the arm is stopped or the body appears
+  double at_s = 0.0;  // when the arm is stopped or the body appears, since power on
   Body body{};
 };
 
@@ -49,18 +49,18 @@ struct Sample {
 
 struct TrialResult {
   std::vector<Sample> samples;  // one for each step of the physics
-  double stopped_at_s = 0.0;    // when the stop was ordered or the power went off
-  std::string end;              // the fault that ended the session, in words; else empty
+  double stopped_at_s = 0.0;    // when the stop was ordered or the power was cut
+  std::string end;              // the fault that ended the session, in words; empty: no fault
 };
 
 // Runs a trial. Throws SetupError if the session can't begin.
 using ArmTrial = std::function<TrialResult(const Trial&)>;
 
-// The tool counts as stopped once it stays within this distance of its final place, in m. It is less than skin yields,
-// and elastic gears may oscillate within it for some tenths of a second after a stop.
+// The tool counts as stopped once it stays within this distance of its final place, m. It is smaller
+// than the yielding of skin; elastic gears may oscillate within it for some tenths of a second after a stop.
 inline constexpr double stopped_within_m = 1e-3;
-// The tool counts as at rest at the end of a trial if it is slower than this, in m/s; an oscillation of 0.1 mm at 16
-// Hz, an arm's first mode, has this speed.
+// At the end of a trial, a tool slower than this counts as at rest, m/s: the speed of an oscillation of 0.1 mm at 16
+// Hz, an arm's first mode.
 inline constexpr double rest_m_per_s = 0.01;
 
 struct StopFigure {
@@ -77,9 +77,9 @@ struct ClampFigure {
   double transient_N = 0.0,
          quasi_static_N = 0.0;  // largest force in the first half second of the contact, and after it
   double energy_J = 0.0;        // largest k x²/2
-  double left_N = 0.0;          // the force that is left at the trial's end
+  double left_N = 0.0;          // the force at the trial's end
   double at_m_per_s = 0.0;      // the tool's speed at contact
-  int pose = 0;                 // the pose of the largest transient force
+  int pose = 0;                 // of the largest transient force
   std::string direction{}, end{};
 };
 
@@ -90,8 +90,8 @@ struct Assessment {
   std::vector<ClampFigure> clamps;     // by the body's place and stiffness
 };
 
-// The start pose and others about it, within ranges, workspace and keep-out zones. None is much nearer to a singularity
-// than the start. Returns fewer than asked for if there aren't enough, and the same ones for each call.
+// The start pose and others near it, within ranges, workspace and keep-out zones, none much nearer to a singularity
+// than the start. The result is the same for each call, and shorter than `count` if there aren't enough poses.
 std::vector<std::vector<double>> poses_about_start(const description::Cell& cell, const models::Arm& arm, int count);
 
 // The figures of a trial in which the arm was stopped.

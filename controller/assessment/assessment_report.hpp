@@ -7,16 +7,16 @@
 
 namespace proxarm::assessment {
 
-// What was assessed, as far as only the command knows it.
+// What was assessed: facts that only the command knows.
 struct Subject {
   std::string cell, hand;                                                      // names
   double stiffness_N_per_m = 0.0, damping_Ns_per_m = 0.0, hand_mass_kg = 0.0;  // of the hand
   double felt_mass_kg = 0.0, period_s = 0.0, max_tool_speed_m_per_s = 0.0;
   int assumed_brakes = 0;                                         // drives whose cell doesn't describe their brakes
-  double assumed_brake_delay_s = 0.0, assumed_brake_share = 0.0;  // the share is one of max_torque_Nm
+  double assumed_brake_delay_s = 0.0, assumed_brake_share = 0.0;  // the share is of max_torque_Nm
 };
 
-// The regions for which a body of their stiffness exceeds the thresholds, joined by names: "hands and fingers".
+// Names of the regions whose thresholds a body with the region's stiffness exceeds, such as "hands and fingers".
 std::vector<std::string> exceeded(const Assessment& assessment, const Thresholds& thresholds);
 
 std::string text(const Subject& subject, const Assessment& assessment, const Thresholds& thresholds);

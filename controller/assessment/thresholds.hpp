@@ -1,4 +1,4 @@
-// What a hand bears and what it notices, read from a file that names its sources.
+// Thresholds of contact force and of vibration for a person, read from a file that names its sources.
 //
 //   source: "…"                    # standard, year, table, and where it was read; printed with each figure
 //   regions:
@@ -8,8 +8,8 @@
 //     points:                      # 2 to 100, by frequency
 //       - {frequency_Hz: 10, amplitude_um: 3}
 //
-// A region is judged against a body of its own stiffness. Pressures aren't judged, since they depend on the shapes of
-// the parts, which a cell file doesn't have.
+// A region is judged against a body with the region's stiffness. Pressures aren't judged: they depend on the parts'
+// shapes, which a cell file doesn't have.
 #pragma once
 
 #include <filesystem>
@@ -26,16 +26,16 @@ struct Region {
   double quasi_static_N = 0.0;  // after that
 };
 
-// From which amplitude on a hand notices a vibration of what it grasps.
+// The amplitude from which a hand notices a vibration of what it grasps.
 struct VibrationThreshold {
   struct Point {
     double frequency_Hz = 0.0;
     double amplitude_m = 0.0;  // half of peak to peak
   };
   std::string source;
-  std::vector<Point> points;  // at least two, by rising frequency
+  std::vector<Point> points;  // at least two, by ascending frequency
 
-  // Between the points, both axes logarithmic; none beyond them.
+  // Interpolated between the points, both axes logarithmic; nullopt beyond them.
   [[nodiscard]] std::optional<double> amplitude_m(double frequency_Hz) const;
 };
 

@@ -14,11 +14,11 @@ namespace {
 
 constexpr int threshold_exceeded = 1;
 
-// Of a cell that doesn't say how its brakes are. Nobody's data sheet: holding brakes of servo motors take some 10 to
-// 100 ms to close, and hold about the motor's rated torque, a third to a half of what it gives for a short time.
+// Assumed for a cell that doesn't describe its brakes, and not from a data sheet. Holding brakes of servo motors take
+// about 10 to 100 ms to close. They hold about the motor's rated torque, a third to a half of its peak torque.
 constexpr double assumed_brake_delay_s = 0.1, assumed_brake_share = 0.5;
 
-// Returns of how many drives something was assumed.
+// Returns the number of drives for which something was assumed.
 int assume_brakes(description::Cell& cell) {
   int assumed = 0;
   for (description::DriveDescription& drive : cell.drives) {

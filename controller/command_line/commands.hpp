@@ -1,4 +1,4 @@
-// The subcommands of proxarm; each returns the exit status and throws SetupError.
+// The subcommands of proxarm. Each function returns the exit status and throws SetupError.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ struct FileOptions {
 
 struct CheckFilesOptions {
   std::vector<std::filesystem::path> files;
-  std::filesystem::path scene;  // that cells are held against; empty: their own
-  scenes::CheckOptions states;  // in which scenes are tried
+  std::filesystem::path scene;  // cells are checked with it; empty: with their default scenes
+  scenes::CheckOptions states;  // how scenes are tried
 };
 
 struct SetOptions {
@@ -41,7 +41,7 @@ struct ReplayOptions {
 
 struct SignalsOptions {
   std::filesystem::path folder;
-  bool contacts = false, frames = false;  // the table of contacts, or the frames, instead
+  bool contacts = false, frames = false;  // print the table of contacts, or the frames, instead of the signals
 };
 
 struct ScanOptions {
@@ -51,53 +51,53 @@ struct ScanOptions {
 
 struct ProveOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
   std::filesystem::path out;  // empty: beside the cell
-  bool bus_loss = false;      // what the drives do when the controller falls silent, and nothing else
+  bool bus_loss = false;      // test only what the drives do when the controller falls silent
 };
 
 struct ZeroOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
   std::filesystem::path out;  // empty: beside the cell
 };
 
 struct IdentifyOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same
-  bool joints = false;        // friction, rotors and gears of the joints, instead of what hangs behind the sensor
-  bool compare = false;       // with the cell and its zero
-  bool write = false;         // into the cell and its zero
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
+  bool joints = false;        // identify friction, rotors and gears of the joints instead of the load behind the sensor
+  bool compare = false;       // with the values in the cell and its zero file
+  bool write = false;         // into the cell and its zero file
 };
 
 struct AssessOptions {
   RunOptions run;
-  std::filesystem::path thresholds;  // empty: the shipped ones
+  std::filesystem::path thresholds;  // empty: the shipped file
   int poses = 4;
 };
 
 struct SchemaOptions {
   std::string kind;       // cell, hand, scene, sensor, drive
-  bool markdown = false;  // tables of keys in place of a JSON Schema
+  bool markdown = false;  // print tables of keys instead of a JSON Schema
 };
 
 int run_command(const RunOptions& options);
 int sim_command(const RunOptions& options);
 int plan_command(const RunOptions& options);
-int scan_command(const ScanOptions& options);         // 1: nothing answers
-int replay_command(const ReplayOptions& options);     // 1: other setpoints
-int signals_command(const SignalsOptions& options);   // a record's, as text
-int set_command(const SetOptions& options);           // of a running session
-int status_command(const StatusOptions& options);     // of a running session
-int check_command(const CheckFilesOptions& options);  // 2: one is wrong
+int scan_command(const ScanOptions& options);         // 1: no device answers
+int replay_command(const ReplayOptions& options);     // 1: the setpoints differ
+int signals_command(const SignalsOptions& options);   // prints a record as text
+int set_command(const SetOptions& options);           // changes a running session
+int status_command(const StatusOptions& options);     // shows a running session
+int check_command(const CheckFilesOptions& options);  // 2: a file is wrong
 int explain_command(const FileOptions& options);
 int schema_command(const SchemaOptions& options);
 int tune_command(const RunOptions& options);
 int prove_command(const ProveOptions& options);               // 1: not proven
-int zero_command(const ZeroOptions& options);                 // 1: somebody was there
-int identify_command(const IdentifyOptions& options);         // 1: not identified, or another than the cell's
-int identify_joints_command(const IdentifyOptions& options);  // likewise
-int calibrate_command(const CalibrateOptions& options);       // 1: poses that don't fit one another
+int zero_command(const ZeroOptions& options);                 // 1: the sensor wasn't tared
+int identify_command(const IdentifyOptions& options);         // 1: not identified, or different from the cell's values
+int identify_joints_command(const IdentifyOptions& options);  // 1: as above
+int calibrate_command(const CalibrateOptions& options);       // 1: the poses don't fit one another
 int assess_command(const AssessOptions& options);             // 1: a threshold is exceeded
 
 }  // namespace proxarm::command_line

@@ -45,8 +45,8 @@ void tell(const std::vector<std::string>& lines) {
   for (const std::string& line : lines) std::printf("%s\n", line.c_str());
 }
 
-// Assumption 1 and the laws of each object and the whole, with the worst figures. What the scene is; null if it is
-// wrong; kUntouched without a verdict.
+// Checks Assumption 1 and the laws for each object and for the whole scene, and prints the worst figures. Returns what
+// the scene is, kUntouched if nothing was touched, or null if the scene is wrong.
 const char* const kUntouched = "nothing was touched";
 
 const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& options) {
@@ -73,7 +73,7 @@ void tell_joined(const scenes::Scene& scene) {
   if (!plan.joined.empty()) std::printf("stand flush, and hold as one: %s\n", joined_text(scene, plan).c_str());
 }
 
-// What became of each mesh's faces, and where it lies.
+// Prints what the loader did with each mesh's faces, and where the mesh lies.
 void tell_meshes(const scenes::Scene& scene) {
   for (const scenes::Object& object : scene.objects) {
     const auto* const shape = std::get_if<scenes::MeshShape>(&object.shape);
@@ -86,7 +86,7 @@ void tell_meshes(const scenes::Scene& scene) {
   }
 }
 
-// The laws are those of a point's 𝒢. With a tool, what it can't be rendered in is refused beside that.
+// Checks the laws of a point's 𝒢. Throws SetupError if the scene's tool can't be rendered with its objects.
 const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOptions& options) {
   if (scene.tool) {
     scenes::compile_rigid(scene, scene.tool->shape);
@@ -94,7 +94,7 @@ const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOpti
         "the laws of its objects, tried with a point; whether its tool fits is told by `proxarm check CELL --scene`\n",
         stdout);
   }
-  // Distances need the place where a tool starts: they are judged together with a cell.
+  // Distances depend on where a tool starts, so they are judged only together with a cell.
   const double anywhere_m = std::numeric_limits<double>::infinity();
   tell(controller::scene_doubts(scene, models::Vec3::Zero(), anywhere_m));
   if (!scene.tool) tell_joined(scene);
@@ -108,13 +108,15 @@ void check_tool(const fs::path& file) {
   scenes::compile_rigid(nothing, nothing.tool->shape);
 }
 
-// Throws SetupError for what the simulated arm can't be, such as gears that are too stiff for its step.
+// Throws SetupError if the arm can't be simulated, for example because its gears are too stiff for the simulation's
+// step.
 void require_simulable(const PreparedSession& session) {
   fieldbus::SimulatedCanNetwork network(sim::simulated_buses(session.cell));
   const sim::SimulatedCell far_end(session.cell, session.sensor, session.hand, network.events());
 }
 
-// With the files that it names, each device as the controller would make it, and all that `run` would refuse.
+// Checks a cell with the files that it names: builds each device as the controller would, and refuses what `run` would
+// refuse.
 void check_cell(const fs::path& file, const fs::path& scene) {
   const description::Cell cell = description::load_cell(file);
   if (!cell.default_scene.empty()) description::require_default_file(cell, "default_scene", cell.default_scene);
@@ -151,7 +153,7 @@ void tell_sources(const fs::path& file) {
   }
 }
 
-// What is wrong with a mesh is told; whether that matters is for its scene to say. Returns what is fine.
+// Prints a mesh's defects; whether they matter depends on the scene. Returns what the mesh can be used for.
 const char* tell_mesh(const fs::path& file) {
   const scenes::LoadedMesh loaded = scenes::load_mesh(file, {});
   tell(scenes::mesh_report(loaded));
@@ -225,7 +227,8 @@ int check_command(const CheckFilesOptions& options) {
 
 namespace {
 
-// What a cycle of the default cell does around that, counted in its default session; why not, where that can't be.
+// Describes what a cycle of the default cell computes around 𝒢, counted in its default session. If the cell can't
+// render the scene, returns the reason.
 std::string explain_cycle(const fs::path& scene) {
   RunOptions options;
   options.scene = scene;

@@ -1,4 +1,4 @@
-// proxarm's command line: the one place that knows the controller, the field bus and the simulated arm.
+// proxarm's command line: the only file that knows the controller, the field bus and the simulated arm.
 //
 // Exit status: 0 fine, 1 a fault ended the run or the arm oscillated, 2 set-up mistake.
 #include <unistd.h>
@@ -159,7 +159,7 @@ void add_calibrate_options(CLI::App& app, command_line::CalibrateOptions& option
   add_arm_option(app, options.arm);
 }
 
-// The commands with their options; the one that was chosen waits in `chosen`.
+// The commands with their options. `chosen` holds the command to run.
 class Commands {
  public:
   explicit Commands(CLI::App& app) : app_(app) {
@@ -168,7 +168,7 @@ class Commands {
     add_orders();
     add_files();
     add_judges();
-    // These are programs of their own: become().
+    // These are separate programs; see become().
     app_.add_subcommand("new-cell", "a cell of your own arm out of its URDF or xacro: runs at once in simulation");
     app_.add_subcommand("study", "accuracy, stability and speed measured: CSV, JSON and plots");
     app_.add_subcommand("view", "a recorded session or a black box in the browser");
@@ -219,7 +219,6 @@ class Commands {
         ->type_name("BASE_ID");
   }
 
-  // Changes and orders to a running session, each a line on its socket.
   void add_orders() {
     constexpr const char* control_text = "the session's socket, where `proxarm run --control PATH` isn't \"default\"";
     CLI::App* set = add(
@@ -412,8 +411,8 @@ int run(int argc, char** argv) {
   return commands.chosen();
 }
 
-// A program of its own beside this one, which a session doesn't wait for when it is built, and doesn't have in its
-// memory. Not there: `missing` says what it is for, `builder` what builds it.
+// Replaces this process by another program in the same folder. Such programs keep proxarm quick to build and small in
+// memory. If the program is missing, the error says what it is for (`missing`) and which command builds it (`builder`).
 int become(const char* name, std::vector<char*> words, const char* missing, const char* builder) {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").replace_filename(name);
   words.push_back(nullptr);

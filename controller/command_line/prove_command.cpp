@@ -24,7 +24,7 @@ PreparedSession prepared(const RunOptions& options) {
   RunOptions run = options;
   run.scene = shipped_file("scenes/free.yaml");
   PreparedSession session = prepare(run);
-  // Where the sensor is mounted and what it reads is what is to be proven: it isn't taken for known.
+  // The proof is to find the sensor's mounting and zero, so neither is taken as known.
   session.settings.zero_drift_N = std::numeric_limits<double>::infinity();
   if (!session.impedance()) return session;
   throw description::SetupError({.file = session.cell.file.string(),
@@ -33,7 +33,7 @@ PreparedSession prepared(const RunOptions& options) {
                                  .expected = "one whose drives take positions"});
 }
 
-// The hand of an arm that is a process of its own hears no question.
+// A hand in another process can't hear what the proof asks for.
 void tell_of_helper() {
   std::fprintf(
       stderr,

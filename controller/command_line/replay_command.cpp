@@ -23,7 +23,7 @@ using description::SetupError;
 
 constexpr int other_setpoints = 1;
 
-// A Modbus line whose answers come out of the record.
+// A Modbus line without a device; its answers come from the record.
 class NoLine final : public fieldbus::ModbusClient {
  public:
   fieldbus::ModbusResult transact(const fieldbus::ModbusMessage&, fieldbus::ModbusMessage&) noexcept override {
@@ -68,7 +68,7 @@ class Replay {
                       .expected = std::to_string(state.bytes()) + ", as this version's controller has it"});
   }
 
-  // The first setpoint that is another one, if there is any.
+  // Returns the first setpoint that differs from the record, if there is one.
   std::optional<Difference> run() {
     BoxCycle recorded;
     std::vector<BoxFrame> frames;

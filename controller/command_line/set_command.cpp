@@ -10,7 +10,7 @@
 namespace proxarm::command_line {
 namespace {
 
-// All in one line: the session makes all of the changes or none.
+// One line for all changes: the session makes all of them or none.
 std::string line_of(const std::vector<std::string>& changes) {
   std::string line;
   for (const std::string& change : changes) {

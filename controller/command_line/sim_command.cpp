@@ -18,7 +18,7 @@ namespace proxarm::command_line {
 
 namespace {
 
-// Who is at the handle: for a proof nobody but the helper.
+// Returns the hand at the handle. For a proof that is a hand without force: a helper pushes as the proof asks.
 description::HandDescription hand_of(const PreparedSession& session, const RunOptions& options) {
   if (!options.for_proof) return session.hand;
   if (!options.hand.empty()) {
@@ -32,7 +32,7 @@ description::HandDescription hand_of(const PreparedSession& session, const RunOp
   return nobody;
 }
 
-// Two of one node would answer each other's requests.
+// Two devices with one node number would both answer requests to it.
 void require_nobody_plays(const description::Cell& cell, fieldbus::CanNetwork& network,
                           const std::vector<std::size_t>& interface_of_bus) {
   std::vector<fieldbus::BusToLead> buses;
@@ -48,7 +48,7 @@ void require_nobody_plays(const description::Cell& cell, fieldbus::CanNetwork& n
 
 }  // namespace
 
-// Runs until a signal, or until nobody is there to read what it says.
+// Runs until a signal, or until the reader of its output is gone.
 int sim_command(const RunOptions& options) {
   if (options.bus.simulated()) {
     throw description::SetupError({.key = "--bus",

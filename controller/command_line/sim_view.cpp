@@ -5,7 +5,7 @@ namespace {
 
 constexpr std::int64_t period_ns = 1'000'000;
 
-// How far its drives are, as the phase of a session that would have them so.
+// Returns the session phase that fits the number of powered drives.
 controller::Phase phase_of(const sim::Plant& plant) noexcept {
   std::size_t powered = 0;
   for (std::size_t axis = 0; axis < plant.axis_count(); ++axis) powered += plant.servo(axis).powered() ? 1 : 0;
@@ -41,7 +41,7 @@ void SimView::add(const sim::Truth& truth) noexcept {
   record.force_S_N = controller::triple(truth.sensor_wrench_S.force);
   record.torque_S_Nm = controller::triple(truth.sensor_wrench_S.torque);
   record.force_W_N = record.hand_force_W_N = controller::triple(truth.hand_force_W);
-  // Without a proxy: a line between the two has no length.
+  // There is no proxy: a line from tool to proxy then has length 0.
   record.tool_W_m = record.proxy_W_m = record.p_hat_W_m = controller::triple(truth.X_WT.translation());
   for (std::size_t axis = 0; axis < plant.axis_count() && axis < controller::max_axes; ++axis) {
     record.actual_counts[axis] = plant.servo(axis).position_counts();

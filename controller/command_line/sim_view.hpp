@@ -1,5 +1,5 @@
-// `proxarm sim --view`: the simulated arm in a browser, with what its own process knows. That is the arm, its drives,
-// the hand and the load on the sensor. A proxy and its contacts are the controller's, which is another process.
+// `proxarm sim --view`: shows the simulated arm in a browser, with what the simulation knows: arm, drives, hand and
+// load on the sensor. The proxy and its contacts belong to the controller, which is another process.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,10 @@ namespace proxarm::command_line {
 
 class SimView {
  public:
-  // Starts the process that shows it. No other thread may run yet. Throws SetupError.
+  // Starts the process that shows the arm. Precondition: no other thread runs yet. Throws SetupError.
   SimView(const PreparedSession& session, const RunOptions& options);
 
-  // From now on every millisecond of this arm is shown. It must not move any more after this object is gone.
+  // Shows every millisecond of this arm from now on. Precondition: the arm doesn't move after this object is destroyed.
   void watch(sim::SimulatedCell& cell);
 
  private:
@@ -25,7 +25,7 @@ class SimView {
   controller::BlackBox box_;
   ViewProcess process_;
   sim::SimulatedCell* cell_ = nullptr;
-  std::int64_t begun_ns_ = 0, next_ns_ = 0;  // the first that is shown, and the next
+  std::int64_t begun_ns_ = 0, next_ns_ = 0;  // time of the first cycle shown, and of the next one
 };
 
 }  // namespace proxarm::command_line

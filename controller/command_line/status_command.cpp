@@ -10,7 +10,7 @@
 namespace proxarm::command_line {
 namespace {
 
-// About as fast as a person reads.
+// About as fast as a person can read.
 constexpr auto watch_every = std::chrono::milliseconds(250);
 
 }  // namespace

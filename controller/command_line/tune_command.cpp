@@ -25,7 +25,7 @@ using controller::hand_margin;
 using controller::HandModel;
 using controller::LoopModel;
 
-// Felt mass, handle included, at which the loop is just stable.
+// Returns the felt mass, handle included, at which the loop is just stable.
 std::optional<double> smallest_felt(const HandModel& hand, const LoopModel& loop) {
   const auto mass = controller::smallest_stable_mass(hand, loop);
   return mass ? std::optional<double>(*mass + loop.handle_mass_kg) : std::nullopt;
@@ -38,13 +38,13 @@ std::string mass_text(const std::optional<double>& mass) {
   return text.data();
 }
 
-// The least damping with which some mass is stable with the margins.
+// Returns the least damping with which some mass is stable with margins.
 std::optional<controller::DampedMass> damping_needed(const HandModel& hand, const LoopModel& loop) {
   return controller::least_damping(loop, HUGE_VAL,
                                    [&](const LoopModel& damped) { return smallest_with_margins(hand, damped); });
 }
 
-// What would be, were one thing ideal.
+// The smallest stable mass if one part of the loop were ideal.
 struct Limit {
   const char* what;
   std::optional<double> mass_without;
@@ -76,14 +76,14 @@ std::vector<Limit> limits(const PreparedSession& session, const LoopModel& loop,
     l.handle_mass_kg = 0.0;
     h.mass_kg = 0.0;
   });
-  // Most is gained by the first.
+  // The part that limits the mass most comes first.
   std::stable_sort(list.begin(), list.end(), [](const Limit& a, const Limit& b) {
     return a.mass_without.value_or(1e9) < b.mass_without.value_or(1e9);
   });
   return list;
 }
 
-// The largest timestep, of those that drives hold exactly, up to which the wanted mass has its margins.
+// Returns the largest timestep that drives hold exactly and up to which the wanted mass has its margins.
 std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const LoopModel& loop) {
   std::optional<double> largest;
   for (const double ms : {0.1, 0.2, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 8.0, 10.0, 20.0}) {
@@ -97,10 +97,11 @@ std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const 
   return largest;
 }
 
-// What is being looked for, on a terminal: it takes some seconds, a dozen with an inertia. Short, for a line of 80.
+// Shows the current search on a terminal: the whole takes some seconds, a dozen with an inertia. Texts fit a line of 80
+// columns.
 class Stages {
  public:
-  // Until the next one, or until something is printed.
+  // Shows `what` until the next stage begins or something is printed.
   void begin(const std::string& what) {
     done();
     progress_.update(begun_++, what);
@@ -108,7 +109,7 @@ class Stages {
   void done() { progress_.clear(); }
 
  private:
-  static constexpr int most = 13;  // of all that may come
+  static constexpr int most = 13;  // stages at most
   controller::Progress progress_{most, stderr, "steps"};
   int begun_ = 0;
 };
@@ -118,7 +119,7 @@ std::string in_poses(const std::string& what, std::size_t poses) {
 }
 std::string trying(const std::string& what) { return "trying " + what; }
 
-// What the advice is asked for: the hand as described, and the loop in the poses that it leads to.
+// The input of the advice: the hand as described, and the loop in all poses that the hand leads to.
 struct Tuned {
   const PreparedSession& session;
   HandModel hand;
@@ -146,7 +147,7 @@ void print_delays(const Tuned& of) {
 }
 
 void print_mass(const Tuned& of, const std::optional<double>& smallest) {
-  LoopModel start = of.session.loop;  // in its pose
+  LoopModel start = of.session.loop;  // in the start pose
   start.horizon_s = 0.0;
   const std::string at_start = mass_text(smallest_felt(of.hand, start));
   of.stages.done();
@@ -181,7 +182,7 @@ std::string inertia_text(const std::optional<double>& inertia_kg_m2) {
   return text.data();
 }
 
-// `also`: another option that it takes.
+// `also`: a further option that this inertia needs.
 void print_tried_inertia(const PreparedSession& session, double least_kg_m2, const std::string& also, Stages& stages) {
   stages.begin(trying(inertia_text(least_kg_m2)));
   const TriedAdvice tried = tried_inertia(session, rounded_up(least_kg_m2));
@@ -197,8 +198,8 @@ void print_tried_inertia(const PreparedSession& session, double least_kg_m2, con
   std::printf("tried on the simulated arm: %s\n", tried.text.c_str());
 }
 
-// The least turning damping, of a few, with which some inertia is stable with the margins. A hand that is stiffer than
-// it is damped, K L > D, needs it at any inertia.
+// Prints the least of a few turning dampings with which some inertia is stable with margins. If K L > D (the hand's
+// stiffness, the loop delay, the hand's damping), every inertia needs additional damping.
 void print_turning_damping(PreparedSession session, Stages& stages) {
   stages.begin("inertia with more damping");
   const double own = session.settings.rotational_damping_Nms_per_rad;
@@ -216,7 +217,7 @@ void print_turning_damping(PreparedSession session, Stages& stages) {
               session.settings.mass_kg);
 }
 
-// Of a tool that is led and turned at once, with the mass that was asked for.
+// Prints the inertia for a tool that is moved and turned at once, with the requested mass.
 void print_inertia(const Tuned& of) {
   const PreparedSession& session = of.session;
   if (session.settings.orientation == controller::OrientationMode::held) return;
@@ -245,7 +246,7 @@ void print_tried_damping(const Tuned& of, const controller::DampedMass& damped) 
   std::printf("  tried: %s\n", tried.text.c_str());
 }
 
-// Where no mass has its margins without damping.
+// Precondition: without damping no mass has its margins.
 void print_needed_damping(const Tuned& of) {
   of.stages.begin("damping with margins");
   const auto needed = damping_needed(of.hand, of.loop);
@@ -277,12 +278,12 @@ void print_damping(const Tuned& of) {
       of.loop.period_s * 20.0 / 0.1);
 }
 
-// Returns what limits the smallest mass most, in words.
+// Prints what limits the smallest mass, and returns the largest limit in words.
 std::string print_limits(const Tuned& of, const std::optional<double>& smallest) {
   of.stages.begin(in_poses("what limits the mass", of.loop.arms->size()));
   const auto sorted = limits(of.session, of.loop, of.hand);
   of.stages.done();
-  constexpr double no_mass = 1e9, gain = 0.9;  // less than a tenth isn't worth naming
+  constexpr double no_mass = 1e9, gain = 0.9;  // a gain below a tenth isn't worth naming
   const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
   const std::string limit = helps ? sorted.front().what : "none of these alone";
   std::printf("what limits it: %s; without %s the smallest stable mass would be %s\n", limit.c_str(),

@@ -44,7 +44,7 @@ void BusImage::begin(std::int64_t t_k_ns) noexcept {
   for (DriveOnBus& axis : parts_.drives) axis.drive.on_sync(t_k_ns);
 }
 
-// Frames that came before t_k are received together with those of this cycle.
+// Receives frames from before t_k together with those of this cycle.
 void BusImage::receive_until(std::int64_t deadline_ns, FrameListener& listener) noexcept {
   if (everything_received()) receive_all(listener);
   while (!everything_received() && parts_.network.wait_for_frame(deadline_ns)) receive_all(listener);
@@ -66,7 +66,7 @@ void BusImage::deliver(std::size_t bus, const fieldbus::TimedFrame& received, Fr
   }
   if (listener.on_frame(bus, frame)) return;
   if (parts_.enabling && parts_.enabling->on_frame(bus, frame, received.time_ns)) return;
-  // A bus doesn't loop own frames back, so somebody else has sent this one.
+  // A bus doesn't loop own frames back, so another node has sent this one.
   if (is_masters_own(bus, frame)) alarm_.raise(Fault::second_master, static_cast<std::int32_t>(bus), frame.id);
 }
 
@@ -126,7 +126,7 @@ void BusImage::send(std::size_t bus, const fieldbus::CanFrame& frame) noexcept {
 
 void BusImage::hand_over() noexcept { hand_over(0, outboxes_.size()); }
 
-// The clock is read only twice for all buses, since reading it is a system call if the kernel has no vDSO.
+// Reads the clock only twice for all buses: without a vDSO each reading is a system call.
 void BusImage::hand_over(std::size_t first_bus, std::size_t end_bus) noexcept {
   const std::int64_t now_ns = parts_.network.now_ns();
   for (std::size_t bus = first_bus; bus < end_bus; ++bus) {

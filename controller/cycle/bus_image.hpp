@@ -1,12 +1,12 @@
-// The cycle's side of the wire: SYNC and poll out, answers in, setpoints out.
+// The cycle's connection to the buses: sends SYNC and poll, receives answers, sends setpoints.
 //
 //   begin()           sends SYNC on every drive bus, then the sensor's poll
-//   receive_until()   gives frames to sensor, drives and other listeners, until every device has answered or time is up
-//   send_setpoints()  queues the drives' setpoints, and the controller's heartbeat if one is due
-//   hand_over()       gives the queued frames to the interfaces: those of a bus in one call
+//   receive_until()   passes frames to sensor, drives and other listeners, until all devices have answered or time is
+//   up send_setpoints()  queues the drives' setpoints, and the controller's heartbeat if it is due hand_over() passes
+//   the queued frames to the interfaces, one call per bus
 //
-// Two kinds of frames raise a fault: one that can't be sent, and one that is received but only a master may send. The
-// recorder gets every frame, too. Nothing allocates, locks or throws after construction.
+// A frame that can't be sent raises a fault, and so does a received frame that only a master may send. The recorder
+// gets every frame, too. No allocation, lock or throw after construction.
 #pragma once
 
 #include <array>
@@ -31,34 +31,34 @@ class BusImage {
 
   void begin(std::int64_t t_k_ns) noexcept;
   void receive_until(std::int64_t deadline_ns, FrameListener& listener) noexcept;
-  // The present status of each bus. To be called once per cycle, since the recorder keeps it.
+  // The present status of each bus. Call once per cycle, since the recorder keeps it.
   std::span<const fieldbus::BusStatus> read_status() noexcept;
-  // The status that read_status() returned last.
+  // The last result of read_status().
   [[nodiscard]] std::span<const fieldbus::BusStatus> status() const noexcept { return status_; }
   void send_setpoints(const Setpoints& setpoints, std::int64_t t_k_ns, std::uint64_t cycle) noexcept;
-  // Queues a frame, which leaves with the next hand_over(), behind those queued before on this bus.
+  // Queues a frame, which leaves with the next hand_over(), behind earlier ones of this bus.
   void send(std::size_t bus, const fieldbus::CanFrame& frame) noexcept;
   void hand_over() noexcept;
 
   void request(fieldbus::DriveGoal goal) noexcept;
-  // Whether each drive has reported that it no longer holds its axis. The last report counts; a drive that has gone
-  // silent since can't withdraw it.
+  // Whether all drives have reported that they no longer hold their axes. The last report counts; a drive that has gone
+  // silent can't withdraw it.
   [[nodiscard]] bool drives_off() const noexcept;
-  // The first drive that hasn't reported so, or −1.
+  // The first drive that hasn't reported this, or −1.
   [[nodiscard]] std::int32_t first_drive_on() const noexcept;
   void forget_faults() noexcept;
-  // Precondition: the last cycle has run. Goes on sending SYNC, controlwords and heartbeats, a period at a time, until
-  // each drive that is off no longer waits for them (cia402_goodbye.hpp), for 0.3 s at most. Then the drives go back to
-  // NMT pre-operational.
+  // Precondition: the last cycle has run. Keeps sending SYNC, controlwords and heartbeats each period, until all drives
+  // that are off no longer wait for them (cia402_goodbye.hpp), for at most 0.3 s. Then sends the drives to NMT
+  // pre-operational.
   void shut_down(std::int64_t period_ns) noexcept;
 
-  // What was sent and what came in, for the record and for the black box.
+  // Sent and received values, for the record and the black box.
   void write_record(CycleRecord& record) const noexcept;
   void write_inputs(BoxCycle& entry) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept;
 
  private:
-  // Frames for one bus, which go to its interface together.
+  // Frames for one bus, passed to its interface together.
   struct Outbox {
     std::array<fieldbus::CanFrame, 16> frames{};
     std::array<fieldbus::SendResult, 16> results{};
@@ -71,7 +71,7 @@ class BusImage {
   [[nodiscard]] bool everything_received() const noexcept;
   void hand_over(std::size_t first_bus, std::size_t end_bus) noexcept;
   void note_sent(std::size_t bus, std::int64_t handed_over_ns) noexcept;
-  // After the last cycle, nothing raises a fault or goes into the record.
+  // After the last cycle no function raises faults or writes to the record.
   void say_goodbye(std::int64_t period_ns) noexcept;
   void send_last_words(std::int64_t t_ns) noexcept;
   void listen_until(std::int64_t deadline_ns) noexcept;
@@ -82,8 +82,8 @@ class BusImage {
   std::vector<Outbox> outboxes_;             // by bus; empty between cycles
   std::vector<fieldbus::BusStatus> status_;  // by bus
   fieldbus::Goodbye goodbye_;
-  std::int64_t begun_ns_ = -1;  // the last cycle's t_k; below zero: there was none
-  std::uint64_t cycle_ = 0;     // goes on while saying goodbye, since the heartbeat is timed by it
+  std::int64_t begun_ns_ = -1;  // t_k of the last cycle; below zero: none yet
+  std::uint64_t cycle_ = 0;     // continues during the goodbye, since it times the heartbeat
   bool sends_torques_ = false;
 };
 

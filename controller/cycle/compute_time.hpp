@@ -1,4 +1,4 @@
-// A stopwatch of computing time: it runs from construction on and leaves out the time waited for frames.
+// Measures computing time from construction on, without the time spent waiting for frames.
 #pragma once
 
 #include <chrono>

@@ -1,14 +1,15 @@
-// One period of the session: the same lines on hardware, on vcan, in-process and in tests; only bus and clock differ.
+// One period of a session. Hardware, vcan, in-process simulation and tests run the same lines; only bus and clock
+// differ.
 //
 //   t_k        SYNC on every drive bus, then the sensor's poll
 //   … 0.45 T   receive, until every drive's TPDO and the sensor's sample are in
-//   then       measure, judge, choose the setpoints by the phase, send them (and a heartbeat that is due), record
+//   then       measure, judge, choose the setpoints by the phase, send them (with the heartbeat if due), record
 //
-// The setpoints are latched by the drives at SYNC k+1 and, with their interpolation over the period, reached at k+2.
+// The drives latch the setpoints at SYNC k+1 and, interpolating over the period, reach them at k+2.
 //
-// run_cycle() neither allocates, locks, throws nor prints; all that it touches is built before. Precondition: one
-// thread calls it. Each stage is a part of its own (BusImage, Measurement, FaultMonitor, Motion, TimestepChange,
-// CycleRecorder). Cycle connects them: it knows which phase the session is in, and what that phase does.
+// run_cycle() neither allocates, locks, throws nor prints; all objects are built before. Precondition: one thread calls
+// it. Each stage is a separate part (BusImage, Measurement, FaultMonitor, Motion, TimestepChange, CycleRecorder). Cycle
+// connects them and decides by the session's phase.
 #pragma once
 
 #include <array>
@@ -37,13 +38,13 @@ namespace proxarm::controller {
 
 class Cycle {
  public:
-  // `record_capacity`: the number of records that the ring holds until somebody pops them.
+  // record_capacity: number of records in the ring until they are popped.
   Cycle(CycleParts parts, const SessionSettings& settings, const description::CellLimits& limits,
         std::size_t record_capacity);
   Cycle(const Cycle&) = delete;
   Cycle& operator=(const Cycle&) = delete;
 
-  // Runs one period, which begins at t_k.
+  // Runs the period that begins at t_k.
   void run_cycle(std::int64_t t_k_ns) noexcept;
 
   // ---- any thread
@@ -51,37 +52,37 @@ class Cycle {
   void request_stop() noexcept { status_.request_stop(); }
   [[nodiscard]] bool stop_requested() const noexcept { return status_.stop_requested(); }
 
-  // ---- one thread for each: the one that asks, and the one that takes the records
-  // Changes of parameters, already checked. One is taken per cycle of rendering or of a hold.
+  // ---- one thread for each ring: one that makes requests, one that takes the records
+  // Parameter changes, already checked. Rendering and holds take one per cycle.
   [[nodiscard]] Requests<Change>& changes() noexcept { return requests_.changes; }
-  // Changes of the timestep: only if all drives are on CAN and take positions. The arm stops, the drives are told, and
-  // rendering goes on. A request waits until the arm is rendering or in a hold.
+  // Changes of the timestep, only if all drives are on CAN and take positions. The arm stops, the drives get the new
+  // timestep, and rendering continues. A request waits until the arm is rendering or in a hold.
   [[nodiscard]] Requests<Timestep>& timesteps() noexcept { return requests_.timesteps; }
-  // Commands are taken in any phase. One that the phase has no use for is dropped; CycleStatus::refusal() tells
-  // beforehand whether it would be.
+  // Commands are taken in any phase, and dropped if they don't apply to it; CycleStatus::refusal() tells this in
+  // advance.
   [[nodiscard]] Requests<Command>& commands() noexcept { return requests_.commands; }
-  // The records of the cycles, for the thread that writes files.
+  // Records for the thread that writes files.
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return recorder_.records(); }
 
   // ---- the loop's owner, between cycles
-  // Precondition: no cycle has run. From then on each cycle's inputs and outputs are also written to `box`.
+  // Precondition: no cycle has run. All later cycles also write their inputs and outputs to `box`.
   void write_to(CycleBox& box) noexcept { recorder_.write_to(box); }
-  // Tells the next cycle how many cycles in a row were late; and whether the last one was late by the clock on the
-  // wall, which simulated time waited for: that is recorded, and nothing more.
+  // Reports to the next cycle how many consecutive cycles were late. was_waited_for: the last one was late by the wall
+  // clock, and simulated time waited for it; this is only recorded.
   void report_overruns(std::uint32_t in_a_row, bool was_waited_for = false) noexcept {
     overruns_in_a_row_ = in_a_row;
     was_waited_for_ = was_waited_for;
   }
-  // Archives all state that a cycle leaves to the next one. From it and the recorded inputs, a replay computes the same
-  // setpoints.
+  // Archives all state that a cycle leaves to the next. From this state and the recorded inputs, a replay computes the
+  // same setpoints.
   void archive(fieldbus::StateArchive& state) noexcept;
-  // Precondition: the last cycle has run. The drives go back to NMT pre-operational. Never fails.
+  // Precondition: the last cycle has run. Sends the drives to NMT pre-operational. Never fails.
   void shut_down() noexcept { bus_.shut_down(period_ns()); }
 
   [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
-  // What taring has shown, and the bias as it was followed since.
+  // Results of the tare, and the bias since then.
   [[nodiscard]] const Measurement& measurement() const noexcept { return measurement_; }
-  // Null: nothing is counted.
+  // Null: no counts.
   [[nodiscard]] const MotionWork* work() const noexcept { return motion_->work(); }
   [[nodiscard]] std::span<const ScheduledCommand> scheduled_commands() const noexcept {
     return requests_.commands.script();
@@ -94,11 +95,11 @@ class Cycle {
   }
   [[nodiscard]] std::uint64_t rendered_cycles() const noexcept { return state_.rendered_cycles; }
   [[nodiscard]] std::int64_t rendered_ns() const noexcept { return state_.rendered_ns; }
-  // The time from the last cycle to the next one.
+  // Time from the last cycle to the next.
   [[nodiscard]] std::int64_t period_ns() const noexcept { return ns_of(settings_.period_s); }
-  // Whether every drive has reported, after the last cycle, that it no longer holds its axis.
+  // Whether all drives have reported, after the last cycle, that they no longer hold their axes.
   [[nodiscard]] bool drives_off() const noexcept { return bus_.drives_off(); }
-  // The latest eight of the faults that were reset, oldest first; and the number of all that were.
+  // The latest eight faults that were reset, oldest first; and the number of all.
   [[nodiscard]] std::span<const FaultReport> past_faults() const noexcept { return past_faults_.latest(); }
   [[nodiscard]] std::uint64_t past_fault_count() const noexcept { return past_faults_.count(); }
   [[nodiscard]] const CycleParts& parts() const noexcept { return parts_; }
@@ -111,19 +112,19 @@ class Cycle {
   };
   // The session's state between cycles.
   struct State {
-    Phase entered_phase = Phase::idle;  // the phase that enter() was last called for
+    Phase entered_phase = Phase::idle;  // last phase passed to enter()
     std::int64_t phase_since_ns = 0;
     std::int64_t first_cycle_ns = 0;
     std::uint64_t cycle = 0;  // k
     std::uint64_t rendered_cycles = 0;
     std::int64_t rendered_ns = 0;
     bool tared = false;
-    bool wants_resume = false;  // to leave this hold: the enabling input was pressed anew, or somebody asked for it
-    Command awaits_rest;        // an order to release or back off, given in a hold while the arm still moves
-    bool yields = false;        // stopped because of a force, the arm backs off from what presses
-    bool yielded = false;       // it has done so
+    bool wants_resume = false;  // to leave this hold: the enabling input was pressed anew, or on command
+    Command awaits_rest;        // order to release or back off, given while the arm still moved
+    bool yields = false;        // after a stop because of a force, the arm backs off from it
+    bool yielded = false;       // yielding is over
     std::int64_t yields_since_ns = 0;
-    std::int64_t moved_ns = 0;  // when a joint of an arm without power last moved
+    std::int64_t moved_ns = 0;  // last time at which a joint without power moved
   };
 
   // cycle.cpp: the stages
@@ -137,7 +138,7 @@ class Cycle {
   void apply(const Timestep& timestep) noexcept;
   void look_ahead(double horizon_s) noexcept;
 
-  // cycle_phases.cpp: what a phase does
+  // cycle_phases.cpp: actions of the phases
   void enter(Phase phase, std::int64_t t_k_ns) noexcept;
   [[nodiscard]] fieldbus::DriveGoal goal_in(Phase phase) const noexcept;
   void act(std::int64_t t_k_ns) noexcept;
@@ -155,7 +156,7 @@ class Cycle {
   [[nodiscard]] MotionCycle motion_cycle() noexcept;
   [[nodiscard]] double in_phase_s(std::int64_t t_k_ns) const noexcept;
 
-  // cycle_requests.cpp: what somebody asks for
+  // cycle_requests.cpp: requests
   void heed_enabling_input(std::int64_t t_k_ns) noexcept;
   void take_command(std::int64_t t_k_ns) noexcept;
   void obey(const Command& command) noexcept;
@@ -171,7 +172,7 @@ class Cycle {
   void supervise_hold(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool may_move() const noexcept;
   [[nodiscard]] bool stands_in_hold() const noexcept;
-  // The number of cycles that `time_s` lasts, rounded up.
+  // Number of cycles in time_s, rounded up.
   [[nodiscard]] std::uint64_t cycles_of(double time_s) const noexcept;
 
   CycleParts parts_;

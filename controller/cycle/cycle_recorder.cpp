@@ -2,7 +2,7 @@
 
 namespace proxarm::controller {
 
-// The box reuses its oldest entry, which is cleared: a replay must not repeat the requests of that old cycle here.
+// Clears the box's oldest entry before its reuse: a replay mustn't repeat the requests of that old cycle.
 void CycleRecorder::begin_entry(std::int64_t t_k_ns) noexcept {
   record_ = {};
   entry_ = &box_->begin(t_k_ns);

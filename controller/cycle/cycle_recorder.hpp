@@ -1,8 +1,7 @@
-// What a cycle leaves behind: a record, which goes through a ring to the thread that writes files, and an entry of the
-// black box.
+// Output of a cycle: a record, which a ring passes to the thread that writes files, and an entry of the black box.
 //
-// A session without a black box writes to one that keeps nothing, so the cycle never asks whether there is one. Nothing
-// here allocates, locks or throws after construction.
+// A session without a black box writes to one that stores nothing, so the cycle never checks for one. No allocation,
+// lock or throw after construction.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +16,7 @@ namespace proxarm::controller {
 
 class CycleRecorder {
  public:
-  // `capacity`: the number of records that the ring holds until somebody pops them.
+  // `capacity`: number of records in the ring until they are popped.
   explicit CycleRecorder(std::size_t capacity) : records_(capacity), entry_(&no_box_.begin(0)) {}
   CycleRecorder(const CycleRecorder&) = delete;
   CycleRecorder& operator=(const CycleRecorder&) = delete;
@@ -25,8 +24,8 @@ class CycleRecorder {
   // Precondition: no cycle has run.
   void write_to(CycleBox& box) noexcept { box_ = &box; }
 
-  // Begins a cycle with an empty record and an empty entry. If the black box has a state due, `archive(StateArchive&)`
-  // writes the cycle's whole state.
+  // Begins a cycle with an empty record and entry. If the black box wants a state, archive(StateArchive&) writes the
+  // cycle's whole state.
   template <typename Archive>
   void begin(std::int64_t t_k_ns, Archive&& archive) noexcept {
     if (const std::span<std::byte> room = box_->state_room(); !room.empty()) {
@@ -49,14 +48,14 @@ class CycleRecorder {
   void add_status(std::size_t bus, const fieldbus::BusStatus& status) noexcept {
     if (bus < max_buses) entry_->buses[bus] = {status.state, status.receive_overflows};
   }
-  // Ends the cycle: the record and the entry are complete.
+  // Ends the cycle, with record and entry complete.
   void finish() noexcept;
 
   // For the thread that writes files.
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return records_; }
 
  private:
-  // A black box that keeps nothing.
+  // A black box that stores nothing.
   class NoBox final : public CycleBox {
    public:
     [[nodiscard]] BoxCycle& begin(std::int64_t /*t_k_ns*/) noexcept override { return entry_; }

@@ -1,5 +1,4 @@
-// What the cycle is asked for (by the enabling input, by commands, by changes of parameters and of the timestep), and
-// when it may do it.
+// Requests to the cycle (enabling input, commands, changes of parameters and timestep), and when it may fulfil them.
 #include <cmath>
 #include <utility>
 
@@ -8,7 +7,7 @@
 namespace proxarm::controller {
 namespace {
 
-// The arm may move again when the cause of its hold has been gone for this time.
+// The arm may move again this long after the cause of its hold has ended.
 constexpr double clear_of_cause_s = 0.1;
 
 }  // namespace
@@ -56,13 +55,13 @@ void Cycle::heed_enabling_input(std::int64_t t_k_ns) noexcept {
 
 // ---- commands
 
-// If a command of the script does nothing, its refusal is kept, to be reported when the session has ended.
+// Keeps the refusal of a script command without effect, for the report at the end of the session.
 void Cycle::take_command(std::int64_t t_k_ns) noexcept {
   Command command;
   if (!requests_.commands.take(t_k_ns - state_.first_cycle_ns, command)) return;
   recorder_.entry().command = command;
   const char* refusal = status_.refusal(command.order);
-  state_.awaits_rest = {};  // an order replaces the one before
+  state_.awaits_rest = {};  // an order replaces the previous one
   obey(command);
   if (refusal == nullptr && command.order == Order::back_off && supervisor_.phase() != Phase::freeing &&
       !awaits_rest()) {
@@ -95,7 +94,7 @@ void Cycle::obey(const Command& command) noexcept {
   }
 }
 
-// A person who is pinned doesn't have to repeat the order: while the arm still moves, the order waits until it stands.
+// A person who is pinned needn't repeat the order: it waits until the arm stands.
 void Cycle::start_freeing(const Command& command) noexcept {
   if (supervisor_.phase() != Phase::holding || !may_move() || timestep_.under_way()) return;
   state_.wants_resume = false;
@@ -128,7 +127,7 @@ void Cycle::take_change() noexcept {
   if (change.period_s != 0.0 && change.period_s != settings_.period_s) {
     return requests_.changes.note_refusal("the timestep that it was checked for wasn't taken");
   }
-  // A mass that was set for figures of the tool that were refused is felt as it was meant.
+  // A mass set for tool figures that were refused is corrected, so that the felt mass is as intended.
   const double tool_kg = tool_.wanted().mass_kg;
   if (change.parameter == Parameter::mass && change.tool_mass_kg > 0.0 && change.tool_mass_kg != tool_kg) {
     change.value += change.tool_mass_kg - tool_kg;
@@ -141,7 +140,7 @@ void Cycle::take_change() noexcept {
   look_ahead(change.parameter == Parameter::lookahead ? change.value : change.horizon_s);
 }
 
-// Returns why the tool's new figures can't be true, or nullptr.
+// Why the tool's new figures can't be true, or nullptr.
 const char* Cycle::take_tool(const Change& change) noexcept {
   const HeldTool now = tool_.wanted();
   const HeldTool wanted{change.tool_mass_kg, models::Vec3(change.position_m.data()), now.handle_S};
@@ -160,7 +159,7 @@ void Cycle::fade_tool() noexcept {
   carry_tool();
 }
 
-// To the models of arm and hand, as far as it has been faded in.
+// Sets the present figures in the models of arm and hand.
 void Cycle::carry_tool() noexcept {
   const HeldTool& present = tool_.present();
   parts_.arm->set_tool(present.mass_kg, present.centre_S);

@@ -1,8 +1,8 @@
-// What other threads may know of a running cycle, and the one thing that any of them may ask of it: to stop.
+// State of a running cycle for other threads, and their request to stop.
 //
-// Each figure is an atomic of its own, written once per cycle by show(). Two figures that are read one after the other
-// may therefore be of different cycles. answered_timesteps() is the exception: it is written last, so whoever reads it
-// first then sees the other figures of that cycle or of a later one.
+// Each value is a separate atomic, written once per cycle by show(), so two values may come from different cycles. But
+// answered_timesteps() is written last: a thread that reads it first sees the other values of that cycle or a later
+// one.
 #pragma once
 
 #include <array>
@@ -15,21 +15,21 @@
 
 namespace proxarm::controller {
 
-// The figures of one cycle.
+// The values of one cycle.
 struct ShownCycle {
   Phase phase = Phase::idle;
   double period_s = 0.0;              // T, from this cycle to the next one
-  bool changes_timestep = false;      // T is being changed
+  bool changes_timestep = false;      // a change of T is under way
   bool pressed = true;                // the enabling input is pressed, or there is none
-  bool cause_lasts = false;           // what the arm is held for still lasts
-  bool timesteps_answered = true;     // no change of the timestep that was asked for is under way
-  std::uint32_t asked_timesteps = 0;  // number taken from the asking thread
-  ToolEvidence tool{};                // by which other figures of the tool are judged
+  bool cause_lasts = false;           // the cause of the hold lasts
+  bool timesteps_answered = true;     // no requested change of the timestep is under way
+  std::uint32_t asked_timesteps = 0;  // number taken from the requesting thread
+  ToolEvidence tool{};                // evidence for judging new figures of the tool
 };
 
 class CycleStatus {
  public:
-  // `fixed_timestep`: why this session keeps its timestep, or nullptr if it can be changed.
+  // fixed_timestep: why this session keeps its timestep; nullptr: it can change.
   CycleStatus(double period_s, const char* fixed_timestep) noexcept
       : fixed_timestep_(fixed_timestep), period_s_(period_s) {}
 
@@ -40,7 +40,7 @@ class CycleStatus {
   // Asks for a controlled stop at the next cycle.
   void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] bool stop_requested() const noexcept { return stop_requested_.load(std::memory_order_relaxed); }
-  // Why an order would do nothing now; nullptr if it would do something.
+  // Why an order would have no effect now; nullptr if it would have one.
   [[nodiscard]] const char* refusal(Order order) const noexcept;
   // Whether this session always keeps its timestep.
   [[nodiscard]] bool keeps_timestep() const noexcept { return fixed_timestep_ != nullptr; }
@@ -49,9 +49,9 @@ class CycleStatus {
   [[nodiscard]] Phase phase() const noexcept { return phase_.load(std::memory_order_relaxed); }
   [[nodiscard]] double period_s() const noexcept { return period_s_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool changes_timestep() const noexcept { return changes_timestep_.load(std::memory_order_relaxed); }
-  // Its figures may be of two cycles in a row, which differ as little as two cycles do.
+  // Its values may come from two successive cycles, which hardly differ.
   [[nodiscard]] ToolEvidence tool_evidence() const noexcept;
-  // How many of the timesteps that a thread asked for have been answered, whether they were taken or refused.
+  // Number of a thread's timestep requests that were answered: taken or refused.
   [[nodiscard]] std::uint32_t answered_timesteps() const noexcept {
     return answered_timesteps_.load(std::memory_order_acquire);
   }

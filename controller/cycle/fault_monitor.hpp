@@ -1,13 +1,13 @@
-// Judges, cycle by cycle, what came from the devices and when: buses, drives, sensor, enabling input, the loop itself.
+// Judges in each cycle the state and timing of the devices: buses, drives, sensor, enabling input and the loop itself.
 //
-// It raises faults (fault.hpp); how the arm reacts is up to the supervisor. What the motion finds out by itself (a
-// leash that is too long, a proxy that isn't finite) isn't judged here.
+// It raises faults (fault.hpp); the supervisor decides the reaction. Faults that the motion detects (such as a leash
+// that is too long, or a proxy that isn't finite) aren't judged here.
 //
-// A sample counts as late from max_missed_samples/3 cycles without one on. Lateness is scored in sixteenths of a
-// sample: each late cycle adds 16, each other one subtracts 1. The score therefore grows if more than one cycle in 17
-// is late; above eight samples (128) it is a fault.
+// A sample counts as late after max_missed_samples/3 cycles without one. The lateness score is in sixteenths of a
+// sample: each late cycle adds 16, each other one subtracts 1. So the score grows if more than one cycle in 17 is late;
+// above eight samples (128) it is a fault.
 //
-// Nothing allocates, locks or throws after construction.
+// No allocation, lock or throw after construction.
 #pragma once
 
 #include <array>
@@ -34,34 +34,33 @@
 
 namespace proxarm::controller {
 
-// All that a cycle is judged by.
+// All inputs for judging a cycle.
 struct JudgedCycle {
   const Measured& measured;
   const fieldbus::ForceSample& sample;           // the sensor's latest
-  const EnablingInput* enabling = nullptr;       // null if there is none
+  const EnablingInput* enabling = nullptr;       // null: none
   std::span<const fieldbus::BusStatus> buses{};  // by their index in the network
   std::uint32_t overruns_in_a_row = 0;
   bool telling = false;                    // SDO answers are on the buses and may delay a drive's TPDO by one frame
-  bool tared = false;                      // the sensor has been tared, so this is no first enabling
-  bool stands = false;                     // the arm is meant to stand still
-  bool backs_off = false;                  // while it is freed, the arm moves in a direction that is set
-  std::optional<models::Wrench> load_S{};  // what the sensor reads without its bias; nullopt: no hand moves the arm
+  bool tared = false;                      // the tare is done, so this is no first enabling
+  bool stands = false;                     // the arm should stand still
+  bool backs_off = false;                  // the arm backs off in a fixed direction
+  std::optional<models::Wrench> load_S{};  // the reading without bias; nullopt: no hand moves the arm
 };
 
-// What is read beyond these bounds is a fault.
+// Readings beyond these bounds are faults.
 struct ReadingBounds {
   double max_force_N = 0.0;
   double max_bias_drift_N = 0.0;
-  double beyond_range_rad = 0.0;  // by which a joint may stand out of its range at the start
+  double beyond_range_rad = 0.0;  // allowed distance of a joint outside its range at the start
   double max_force_step_N = std::numeric_limits<double>::infinity();  // force_jump.hpp
-  models::Vec3 handle_S = models::Vec3::Zero();                       // the handle's point, from the sensor's origin
+  models::Vec3 handle_S = models::Vec3::Zero();                       // handle point, from the sensor's origin
 };
 
 class FaultMonitor {
  public:
-  // `drives_follow` and `tool` are nullopt if the drives take torques, since a hand then moves the arm as it likes.
-  // Precondition: all arguments but these two and `bounds` outlive this object. T, and what is counted in cycles, may
-  // change in `settings`.
+  // drives_follow and tool: nullopt if the drives take torques, since a hand then moves the arm freely. Precondition:
+  // the references outlive this object. In `settings`, T and the counts of cycles may change.
   FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, const ReadingBounds& bounds,
                const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {},
                std::optional<DriveMonitor> drives_follow = {},
@@ -76,13 +75,13 @@ class FaultMonitor {
         drives_follow_(std::move(drives_follow)),
         standstill_(std::move(standstill)) {}
 
-  // Judges whether an encoder's position can have been reached since its last report, and whether a drive is near what
-  // it was told. `entered`: the phase of the cycle before. In phases in which no drive holds the arm, it may be moved
-  // by hand and isn't judged.
+  // Judges whether an encoder can have reached its position since its last report, and whether drives are near their
+  // setpoints. `entered`: phase of the previous cycle. Phases in which no drive holds the arm aren't judged, since it
+  // may be moved by hand.
   void judge_encoders(const Measured& measured, Phase entered) noexcept;
   void judge(const JudgedCycle& cycle) noexcept;
 
-  // After a reset, what was wrong before no longer counts. `buses` as in judge().
+  // After a reset, earlier faults no longer count. `buses` as in judge().
   void forget(std::span<const fieldbus::BusStatus> buses) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
     archive_fields(state, state_);
@@ -94,10 +93,10 @@ class FaultMonitor {
 
  private:
   struct State {
-    std::uint32_t missed_samples = 0;                         // in a row
+    std::uint32_t missed_samples = 0;                         // consecutive
     std::uint32_t late_score = 0;                             // see the file's head
     double since_sample_s = 0.0;                              // up to the last cycle
-    std::uint8_t faulty = 0;                                  // drives that report a fault, and have been judged for it
+    std::uint8_t faulty = 0;                                  // drives that report a fault and have been judged for it
     std::array<std::uint64_t, max_buses> overflows_before{};  // frames lost by each bus that no longer count as a fault
   };
 

@@ -1,4 +1,4 @@
-// An interface for whoever takes other frames than process data.
+// Interface for receivers of frames other than process data.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,8 @@
 
 namespace proxarm::controller {
 
-// Takes frames that are neither the sensor's nor a drive's process data. Returns true if the frame was meant for it.
+// Takes frames that are neither the sensor's nor a drive's process data. Returns true if the frame was for this
+// listener.
 class FrameListener {
  public:
   FrameListener() = default;

@@ -1,4 +1,4 @@
-// The faults of a session that were reset: the latest eight, and the number of all.
+// The reset faults of a session: the latest eight, and the number of all.
 #pragma once
 
 #include <algorithm>

@@ -1,8 +1,8 @@
-// Requests of one kind to a running cycle: by a script, each at its time, and by another thread through a ring.
+// Requests of one kind to a running cycle: from a script, each at its time, and from another thread through a ring.
 //
-// The script goes first. Each call of take() takes at most one request, so that each has a cycle of its own.
-// Precondition: schedule() is called before the first cycle, push() and room() by one thread, and the rest by the cycle
-// alone. The cycle neither allocates, locks nor waits here.
+// The script has priority. take() takes at most one request, so each has a separate cycle. Precondition: schedule() is
+// called before the first cycle, push() and room() by one thread, all others by the cycle only. The cycle neither
+// allocates, locks nor waits here.
 #pragma once
 
 #include <cstddef>
@@ -23,16 +23,16 @@ class Requests {
 
   // Precondition: `script` is sorted by time.
   void schedule(std::vector<Scheduled<T>> script) { script_ = std::move(script); }
-  // Returns false if too many requests are waiting, and drops this one.
+  // Returns false and drops the request if too many are waiting.
   bool push(const T& request) noexcept { return ring_.push(request); }
-  // How many pushes are certain to succeed. To be called by the thread that pushes.
+  // Number of pushes that are certain to succeed. Only for the thread that pushes.
   [[nodiscard]] std::size_t room() noexcept { return ring_.room(); }
 
-  // The script's next request if its time has come, else nullptr. It stays until take() takes it.
+  // The script's next request if its time has come, else nullptr. It stays until taken by take().
   [[nodiscard]] const T* due(std::int64_t now_ns) const noexcept {
     return next_ < script_.size() && script_[next_].at_ns <= now_ns ? &script_[next_].request : nullptr;
   }
-  // Takes the script's request that is due, or else the oldest one of the other thread. Returns false if there is none.
+  // Takes the script's due request, otherwise the other thread's oldest. Returns false if there is none.
   bool take(std::int64_t now_ns, T& out) noexcept {
     scripted_ = nullptr;
     if (due(now_ns) != nullptr) {
@@ -45,19 +45,19 @@ class Requests {
     ++taken_from_thread_;
     return true;
   }
-  // Notes why the request that was taken last did nothing (nullptr: it did). Only the script's refusals are kept.
+  // Notes why the request taken last had no effect (nullptr: it had). Keeps only refusals of script requests.
   void note_refusal(const char* refusal) noexcept {
     if (scripted_ != nullptr) scripted_->refusal = refusal;
   }
   [[nodiscard]] std::span<const Scheduled<T>> script() const noexcept { return script_; }
-  // How many of the other thread's requests have been taken.
+  // Number of the other thread's requests that were taken.
   [[nodiscard]] std::uint32_t taken_from_thread() const noexcept { return taken_from_thread_; }
 
  private:
   SpscRing<T> ring_;
   std::vector<Scheduled<T>> script_;
   std::size_t next_ = 0;              // index of the script's next request
-  Scheduled<T>* scripted_ = nullptr;  // the request taken last, if it is of the script
+  Scheduled<T>* scripted_ = nullptr;  // the request taken last, if from the script
   std::uint32_t taken_from_thread_ = 0;
 };
 

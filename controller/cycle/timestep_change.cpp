@@ -5,8 +5,8 @@
 namespace proxarm::controller {
 namespace {
 
-// How long the arm must have been at rest, and no parameter may have changed. The last setpoint is latched by the next
-// SYNC and reached by the one after; the third cycle is for the answer to that one.
+// Cycles at rest without a parameter change. The next SYNC latches the last setpoint, the one after reaches it, and the
+// third cycle is for its answer.
 constexpr std::uint8_t cycles_at_rest = 3;
 
 }  // namespace
@@ -21,10 +21,10 @@ Timestep timestep_of(const SessionSettings& settings) noexcept {
 
 void TimestepChange::begin(const Timestep& from, const Timestep& to, bool resumes, Alarm& alarm) noexcept {
   state_ = {.stage = Stage::coming_to_rest, .wanted = to, .old = from, .resumes = resumes};
-  (void)alarm.take_hold();  // discards what was raised before
+  (void)alarm.take_hold();  // discards earlier ones
 }
 
-// If something would hold the arm meanwhile, rendering doesn't go on by itself: a person must resume it.
+// If something would have held the arm meanwhile, rendering doesn't continue by itself: a person must resume it.
 TimestepChange::Step TimestepChange::step(std::int64_t t_k_ns, const Surroundings& surroundings, Alarm& alarm,
                                           CycleRecord& record) noexcept {
   if (!under_way()) return {};
@@ -71,7 +71,7 @@ TimestepChange::Step TimestepChange::take_back(Alarm& alarm) noexcept {
 TimestepChange::Step TimestepChange::give_up(const fieldbus::PeriodRefusal& refusal, CycleRecord& record) noexcept {
   record.refused_period_ns = ns_of(state_.wanted.period_s);
   record.timestep_refusal = refusal;
-  if (state_.stage == Stage::coming_to_rest) return end({});  // no drive has been told anything
+  if (state_.stage == Stage::coming_to_rest) return end({});  // no drive has got the new period
   state_.stage = Stage::taking_back;
   exchange_.take_back();
   return {};

@@ -1,15 +1,15 @@
-// A change of the timestep in a running session: what is asked of the drives, stage by stage.
+// Changes the timestep of a running session, in stages.
 //
 //   coming_to_rest   the arm is in a hold, and stands for some cycles
-//   telling          the drives are told (cia402_period.hpp); meanwhile the cycle runs at the shorter of both periods
-//   taking_back      a drive has refused, or the hold has ended: those that were told are told the old period again
-//   unknown          a drive confirms neither period: the fault timestep_unknown. Only a new session, which configures
-//                    the drives, can go on
+//   telling          the drives get the new period (cia402_period.hpp); the cycle runs at the shorter of both periods
+//   taking_back      a drive refused, or the hold ended: drives that got the new period get the old one again
+//   unknown          a drive confirms neither period: fault timestep_unknown. Only a new session, which configures the
+//                    drives, can continue
 //
-// When step() returns a timestep, its caller computes everything that depends on T anew. The arm stands then, and
-// setpoints that don't change may come at any rate. A change can therefore be taken back in any phase.
+// When step() returns a timestep, its caller recomputes everything that depends on T. The arm stands then, and constant
+// setpoints may come at any rate. A change can therefore be taken back in any phase.
 //
-// Nothing allocates, locks or throws after construction.
+// No allocation, lock or throw after construction.
 #pragma once
 
 #include <cstdint>
@@ -27,39 +27,39 @@
 namespace proxarm::controller {
 
 [[nodiscard]] std::int64_t ns_of(double period_s) noexcept;
-// Whether the values can be those of a timestep; one that was read from a file may be anything.
+// Whether the values can be a timestep; from a file they may be anything.
 [[nodiscard]] bool plausible(const Timestep& timestep) noexcept;
-// The timestep that these settings hold.
+// The timestep of these settings.
 [[nodiscard]] Timestep timestep_of(const SessionSettings& settings) noexcept;
 
 class TimestepChange final : public FrameListener {
  public:
-  // The conditions that step() needs to know.
+  // Conditions for step().
   struct Surroundings {
     bool held = false;    // the supervisor's phase is holding
     bool stands = false;  // the arm is at rest in that hold
   };
-  // What the caller of step() has to do.
+  // Tasks for the caller of step().
   struct Step {
-    std::optional<Timestep> now;  // the timestep from this cycle on
-    bool resumes = false;         // the change is over, and rendering goes on
+    std::optional<Timestep> now;  // timestep from this cycle on
+    bool resumes = false;         // the change is over, and rendering continues
   };
 
   explicit TimestepChange(std::span<const fieldbus::DriveSlot> drives) : exchange_(drives) {}
 
-  // Begins a change. `resumes`: rendering goes on after it, unless somebody or something holds the arm meanwhile.
+  // Begins a change. `resumes`: rendering continues after it, unless a person or fault holds the arm meanwhile.
   // Precondition: the arm is in a hold or about to enter one, and no other change is under way.
   void begin(const Timestep& from, const Timestep& to, bool resumes, Alarm& alarm) noexcept;
-  // Runs one cycle of the change. Precondition: called once per cycle. Refusals go into the record.
+  // One cycle of the change. Precondition: called once per cycle. Records refusals.
   Step step(std::int64_t t_k_ns, const Surroundings& surroundings, Alarm& alarm, CycleRecord& record) noexcept;
-  // The next request to a drive that is due now; false if there is none (any more). The caller sends it behind all of
-  // the cycle's own frames, so it delays the next ones by no more than the one frame that is on the wire.
+  // The next due request to a drive; false if there is none. The caller sends it behind the cycle's own frames, so it
+  // delays the next ones by at most one frame.
   [[nodiscard]] bool next_request(std::int64_t t_k_ns, std::size_t& bus, fieldbus::CanFrame& frame) noexcept;
   bool on_frame(std::size_t bus, const fieldbus::CanFrame& frame) noexcept override;
 
-  // Restarts the wait for rest. A change of a parameter, which was checked for the old timestep, has just been taken.
+  // Restarts the wait for rest, after a parameter change that was checked for the old timestep.
   void wait_again() noexcept { state_.rest_cycles = 0; }
-  // Keeps rendering from going on by itself after the change.
+  // Prevents rendering from continuing after the change.
   void stay_in_hold() noexcept { state_.resumes = false; }
 
   [[nodiscard]] bool under_way() const noexcept { return state_.stage != Stage::none; }
@@ -67,7 +67,7 @@ class TimestepChange final : public FrameListener {
   [[nodiscard]] bool telling() const noexcept {
     return state_.stage == Stage::telling || state_.stage == Stage::taking_back;
   }
-  // Whether no change is under way that could still take effect.
+  // Whether no change can still take effect.
   [[nodiscard]] bool settled() const noexcept { return state_.stage == Stage::none || state_.stage == Stage::unknown; }
 
   void archive(fieldbus::StateArchive& state) noexcept;

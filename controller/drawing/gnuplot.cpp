@@ -37,7 +37,8 @@ class TemporaryFolder {
   fs::path path_;
 };
 
-// Runs `program script` in `folder` without a shell, what it says going to "log" there. Empty when it ended well.
+// Runs `program script` in `folder` without a shell, with its output in "log" there. Returns an empty string on
+// success.
 std::string run(const std::string& program, const fs::path& folder) {
   const std::string script = (folder / "plot.gp").string(), log = (folder / "log").string();
   std::array<char*, 3> arguments{const_cast<char*>(program.c_str()), const_cast<char*>(script.c_str()), nullptr};
@@ -85,7 +86,7 @@ std::string draw_svg(const std::string& gnuplot, const std::string& script, cons
   const std::string no_plot = "no plot: ";
   const TemporaryFolder folder;
   if (folder.path().empty()) return no_plot + "no temporary folder can be made";
-  // gnuplot reads and writes beside its script, whatever the names outside are.
+  // gnuplot reads and writes beside its script, independent of outside names.
   std::ofstream(folder.path() / "data") << data;
   std::ofstream(folder.path() / "plot.gp") << "cd " << gnuplot_string(folder.path().string()) << "\n" << script;
   const std::string problem = run(gnuplot, folder.path());

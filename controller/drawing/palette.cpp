@@ -19,7 +19,7 @@ constexpr Colour table[] = {
     {"accent", "#0072b2", "#56b4e9"},
     {"world-top", "#eef2f6", "#1d2630"},
     {"world-bottom", "#d9e0e7", "#0d1217"},
-    // What acts.
+    // Proxy, tool, hand, contacts.
     {"proxy", "#0072b2", "#56b4e9"},
     {"tool", "#803000", "#ffc61a"},
     {"hand", "#561a7d", "#d849f5"},
@@ -27,16 +27,16 @@ constexpr Colour table[] = {
     {"slip", "#cc5500", "#ff8c42"},
     {"shade-stick", "#0072b222", "#56b4e926"},
     {"shade-slip", "#cc550026", "#ff8c422e"},
-    {"band", "#00724f1f", "#4fd1a524"},  // what a hand doesn't notice
+    {"band", "#00724f1f", "#4fd1a524"},  // vibrations that a hand doesn't notice
     {"good", "#00724f", "#4fd1a5"},
     {"bad", "#a3001f", "#ff5c72"},
     {"bad-paper", "#fdecea", "#3a1a1a"},
-    // How far from swinging, from what may swing to what is far from it.
+    // Margin to instability, from the smallest to the largest.
     {"margin-1", "#a3001f", "#ff5c72"},
     {"margin-2", "#b35900", "#ffc61a"},
     {"margin-3", "#0072b2", "#56b4e9"},
     {"margin-4", "#0b2e52", "#e8edf2"},
-    // Bodies, shaded by the light: their edges and grids tell what they are.
+    // Bodies, shaded by light; edges and grids keep them distinct.
     {"arm", "#e3e8ed", "#8fa0b1"},
     {"arm-joint", "#94a3b2", "#5d6e80"},
     {"arm-edge", "#51606f", "#0b1016"},

@@ -1,8 +1,8 @@
-// Colours and line styles of everything that is drawn: the view's page, plots of runs, charts of studies, messages.
+// Colours and line styles of all drawings: the view's page, plots of runs, charts of studies, messages.
 //
-// Each thing that is drawn has one name, and by that name one colour and one dash wherever it appears. Colours stay
-// apart for readers with protanopia and deuteranopia, and from the ground that they lie on (WCAG 2.1, 1.4.3
-// and 1.4.11): tests/controller/drawing/palette_test.cpp computes both of this table.
+// Each drawn thing has one name, and one colour and dash wherever it appears. Colours are distinct for readers with
+// protanopia and deuteranopia, and from their background (WCAG 2.1, 1.4.3 and 1.4.11):
+// tests/controller/drawing/palette_test.cpp computes both for this table.
 #pragma once
 
 #include <array>
@@ -17,10 +17,10 @@ struct Rgb {
   double r = 0.0, g = 0.0, b = 0.0;  // sRGB, 0 to 1
 };
 
-// As CSS writes it: #rrggbb, or #rrggbbaa where it lets the ground through.
+// As in CSS: #rrggbb, or #rrggbbaa if transparent.
 struct Colour {
   const char* name;
-  const char* light;  // on a light ground; plots are drawn on white
+  const char* light;  // on a light background; plots are white
   const char* dark;
 };
 
@@ -31,7 +31,7 @@ struct LineStyle {
   std::array<double, 4> dash;
 };
 
-// A curve of a study's chart, by number: dash and mark alone tell it from any other.
+// A curve of a study's chart, by number: its dash and mark are unique.
 struct SeriesStyle {
   const char* colour;
   double width;
@@ -42,25 +42,26 @@ struct SeriesStyle {
 std::span<const Colour> colours() noexcept;
 std::span<const LineStyle> line_styles() noexcept;
 std::span<const SeriesStyle> series_styles() noexcept;
-// The colours of a map, from its least to its largest value, each lighter than the next: told apart without hue, too.
+// The colours of a map, from its smallest to its largest value, each lighter than the next, so that they differ also
+// without hue.
 std::span<const char* const> map_colours() noexcept;
 
-// Precondition: the table has it.
+// Precondition: the table contains the name.
 const Colour& colour(std::string_view name);
 const LineStyle& line_style(std::string_view name);
 
-// "#rrggbb" or "#rrggbbaa", laid on white.
+// "#rrggbb" or "#rrggbbaa", blended with white.
 Rgb on_white(std::string_view css) noexcept;
-// "#rrggbb" of it.
+// A colour as "#rrggbb".
 std::string css(const Rgb& colour);
 
-// Custom properties of the page: --NAME for each colour, --line-NAME and --dash-NAME for each line, in light and, under
-// :root[data-theme="dark"], in dark.
+// The page's custom properties: --NAME for each colour, --line-NAME and --dash-NAME for each line; light, and under
+// :root[data-theme="dark"] dark.
 std::string palette_css();
 
 // "dt solid" or "dt (6,4)", for gnuplot.
 std::string gnuplot_dash(std::span<const double> dash);
-// "lc rgb '#b35900' dt (6,4)": the line as it is on white.
+// "lc rgb '#b35900' dt (6,4)": the line on white, for gnuplot.
 std::string gnuplot_line(std::string_view name);
 
 }  // namespace proxarm::controller

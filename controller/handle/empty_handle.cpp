@@ -9,25 +9,24 @@ namespace {
 using models::Vec3;
 
 constexpr double filter_s = 0.015;
-// In multiples of σ_f (noise) and of σ/√n (tare). One of three axes exceeds 8 σ_f once in 1e15 samples.
+// Multiples of σ_f (noise) and of σ/√n (tare). One of three axes exceeds 8 σ_f once in 1e15 samples.
 constexpr double noise_deviations = 8.0, tare_deviations = 4.0;
-// For how long, or how far, a hand may need no force: while it moves, in the narrow band; at rest, in the wide one.
+// How long, or how far, a hand may need no force: moving, within the noise band; at rest, within the wide one.
 constexpr double calm_way_m = 0.02, shortest_calm_s = 0.06;
 constexpr double quiet_way_m = 0.04, shortest_quiet_s = 0.5;
 constexpr double longest_s = 1.5;
-// How far what the tare doesn't know of the bias may lead a mass from rest.
+// Largest distance by which the uncertainty of the tare may move a mass from rest.
 constexpr double unknown_way_m = 1.7e-3;
 constexpr double leaving = 1.5;
-// After an acceleration of the arm the handle may oscillate for two periods of its first mode (15 Hz).
+// After an acceleration the arm's first mode (15 Hz) may make the handle oscillate for two periods.
 constexpr double ringing_s = 0.1;
-// The braking force rises within 0.05 s, so that a hand which was taken for absent feels a pull, not a jerk.
+// The braking force rises within 0.05 s, so that a hand which counted as absent feels a pull, not a jerk.
 constexpr double braking_rise_m_per_s3 = 80.0, braking_s = 0.07;
-// As a share of the force that led the handle: what the tool behind the sensor adds while the arm is braked and its
-// gears oscillate.
+// Share of the force that led the handle: the oscillating tool behind the sensor adds as much while the arm brakes.
 constexpr double led_share = 0.2;
-// While the handle is empty, that force is followed with this time constant and at most at this rate.
+// While the handle is empty, the force that led it is followed with this time constant, at most at this rate.
 constexpr double followed_s = 0.1, followed_N_per_s = 2.0;
-// The arm's own motion is over when it has been slower than 0.1 mm/s for half a second.
+// The arm's own motion has ended after half a second below 0.1 mm/s.
 constexpr double rest_m_per_s = 1e-4, rest_time_s = 0.5;
 
 }  // namespace
@@ -37,15 +36,15 @@ EmptyHandle::EmptyHandle(const EmptyHandleConfig& config, double period_s) noexc
 
 void EmptyHandle::set_period(double period_s) noexcept { period_s_ = period_s; }
 
-// The size of the hand's wrench. A torque counts as the force that would make it at the lever.
+// Size of the hand's wrench less the force that led the handle. A torque counts as the force that makes it at lever_m.
 double EmptyHandle::size_N(const models::Wrench& wrench_W) const noexcept {
   const double force_N = (wrench_W.force - state_.bias_W).norm();
   if (!(config_.lever_m > 0.0)) return force_N;
   return std::max(force_N, wrench_W.torque.norm() / config_.lever_m);
 }
 
-// A bias that led the handle is still there and keeps drifting, so it is followed here until the sensor's bias, which
-// the cycle tracks, has taken it over.
+// A bias that led the handle remains and keeps drifting. It is followed here until the cycle's tracking of the sensor's
+// bias includes it.
 void EmptyHandle::follow() noexcept {
   State& s = state_;
   if (!s.led) return;
@@ -55,7 +54,7 @@ void EmptyHandle::follow() noexcept {
   s.bias_W += std::min(1.0, most_N) * behind_W;
 }
 
-// A sensor whose noise is large has a tare that isn't known well, and what isn't known of it leads the mass.
+// The uncertainty of the tare, large with a noisy sensor, moves the mass; so the time within a band is bounded.
 double EmptyHandle::longest_empty_s(const HandSigns& signs, double unknown_N) noexcept {
   if (!(signs.mass_kg > 0.0 && unknown_N > 0.0)) return longest_s;
   return std::clamp(std::sqrt(2.0 * unknown_way_m * signs.mass_kg / unknown_N), shortest_quiet_s, longest_s);
@@ -74,8 +73,7 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
   const double sigma_f = signs.noise_N * std::sqrt(std::min(1.0, signs.sample_cycles * T / (2.0 * filter_s)));
   const double sigma_mean = signs.tare_samples > 0.0 ? signs.noise_N / std::sqrt(signs.tare_samples) : 0.0;
   double noise_band = noise_deviations * sigma_f + tare_deviations * sigma_mean;
-  // Somebody moved the handle during the tare, or the sensor filters its samples. How much of σ is noise isn't known
-  // then.
+  // A hand moved the handle during the tare, or the sensor filters its samples: the noise in σ is then unknown.
   if (!signs.noise_is_white) noise_band = std::min(noise_band, config_.band_N);
   const double band = std::max(config_.band_N, noise_band) + signs.unknown_N;
   noise_band += signs.unknown_N;

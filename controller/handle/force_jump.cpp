@@ -12,18 +12,18 @@ namespace {
 using models::Vec3;
 using models::Wrench;
 
-// Of a sample less the two or so before it, whose variance is some 2.3 σ²: once in 1e7 axes and samples, and none
-// stays.
+// Multiples of σ for a sample less the average of about two before it, whose variance is some 2.3 σ². Exceeded once in
+// 1e7 axes and samples, and never for several in a row.
 constexpr double noises = 8.0;
 constexpr double least_noises = 20.0;
-// A force that shakes from sample to sample is expected now and then: it is calm once it was for some ten samples.
+// A force that jitters may meet the extrapolation by chance: it is calm only after some ten calm samples.
 constexpr double trend_share = 0.25, calm_kept = 0.8;
 constexpr double flipped_share = 0.02, least_flip_N = 1.0, least_turn_N = 10.0;
-// A hand's force that turns to its opposite and then grows by this factor, within a cone of 17 degrees.
+// A hand's force that flips and then grows by this factor, within a cone of 17 degrees.
 constexpr double grown = 2.5, beside_share = 0.3, grows_within_s = 1.0;
-// What stays within this share of the step for so long is one. A blow of steel is over within a few milliseconds.
+// A change that stays within this share of its size for kept_s is a step. A blow of steel ends within milliseconds.
 constexpr double kept_share = 0.2, kept_s = 0.005, back_s = 0.05;
-// A sample that is later than this many of the usual times isn't the next one.
+// A sample later than this many usual intervals doesn't count as the next one.
 constexpr double late = 1.5;
 
 Vec3 turned_about_zero(const Vec3& sign, const Vec3& load, const Vec3& zero) {
@@ -32,7 +32,7 @@ Vec3 turned_about_zero(const Vec3& sign, const Vec3& load, const Vec3& zero) {
 
 }  // namespace
 
-// Whether the sample is this load, to 2 % of the step and the noise.
+// Whether the sample equals the turned load, to 2 % of the step and the noise.
 bool ForceJump::is_turned(const LoadSample& sample, const Wrench& turned_S, double step_N,
                           double step_Nm) const noexcept {
   const double off_N = (sample.load_S.force - turned_S.force).norm();
@@ -42,8 +42,8 @@ bool ForceJump::is_turned(const LoadSample& sample, const Wrench& turned_S, doub
          off_Nm <= flipped_share * step_Nm + noises * noise_lever_m * sample.noise_N + zero_Nm;
 }
 
-// Whether the load is the expected one with its sign, or the sign of two axes, turned. A force that swings through zero
-// is its own opposite from one sample to the next, too, but it was expected to.
+// Whether the load is the extrapolated one with all signs, or those of two axes, reversed. A force that swings through
+// zero also becomes its own opposite between two samples, but the extrapolation expects it.
 bool ForceJump::flipped(const LoadSample& sample, const Wrench& expected_S, double off_N) noexcept {
   State& s = state_;
   const double noise_N = least_noises * sample.noise_N;
@@ -70,7 +70,7 @@ bool ForceJump::flipped(const LoadSample& sample, const Wrench& expected_S, doub
   return false;
 }
 
-// Whether a hand's force that turned grows on its line.
+// Whether the hand's force grows along its line after a flip.
 bool ForceJump::grows(const LoadSample& sample) noexcept {
   State& s = state_;
   if (s.turned_s < 0.0) return false;
@@ -87,13 +87,13 @@ bool ForceJump::grows(const LoadSample& sample) noexcept {
   return true;
 }
 
-// Whether little force is left, or what was there before the last step.
+// Whether the force has become small, or has returned to its value before the last step.
 bool ForceJump::releases(const LoadSample& sample, double near_N) const noexcept {
   const bool back = state_.before_s <= back_s && (sample.load_S.force - state_.before_S).norm() <= near_N;
   return back || sample.hand_S.norm() <= near_N;
 }
 
-// Whether this sample's step is one to watch.
+// Begins to watch this sample's change if it is large enough.
 void ForceJump::watch(const LoadSample& sample, const Wrench& expected_S, double off_N) noexcept {
   State& s = state_;
   const double usual_ms = 1e3 * std::max(sample.usual_s, sample.since_s);

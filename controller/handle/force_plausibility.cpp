@@ -13,16 +13,15 @@ constexpr double at_rest_m_per_s = 2e-3;
 constexpr double first_mark_m = 0.5e-3;
 constexpr std::size_t doublings = 4;
 constexpr double least_growth = 1.45, least_last_growth = 1.6, least_damped_growth = 1.6, most_growth = 2.1;
-constexpr double kept_growth = 0.85;  // of the largest of them, by the last
+constexpr double kept_growth = 0.85;  // the last factor, as a share of the largest
 constexpr double least_time = 0.78, most_time = 1.05;
-// A hundred times the noise of a usual sensor. Ratios of smaller forces say little.
+// A hundred times the noise of a usual sensor; ratios of smaller forces are unreliable.
 constexpr double least_force_N = 2.0;
 
-// For the straight line:
 constexpr double near_m = 1e-3, far_m = 1e-2;
-// The line is tested every 30 samples. If it were tested at each one, chance would reject a good line now and then.
+// The line is tested every 30 samples. A test at each sample would now and then reject a good line by chance.
 constexpr double looks = 30.0, bend_noises = 3.0;
-// For the jump. The share of a fifth allows for the tool behind the sensor, which oscillates as the arm starts.
+// The share of a fifth allows for the tool behind the sensor, which oscillates as the arm starts.
 constexpr double jump_s = 0.03, jump_share = 0.2, jump_noises = 20.0;
 constexpr double ramp_noises = 30.0, constant_noises = 10.0, constant_share = 0.15, speed_gain = 1.5;
 
@@ -72,7 +71,7 @@ void StraightForce::add(const ForceAndMotion& now) noexcept {
   state_.fit.add(now.force_W, now.period_s);
 }
 
-// Whether the force is still, to within a fifth, what it was 30 ms after the handle was empty.
+// Whether the force is the same, to within a fifth, as 30 ms after the handle was last empty.
 bool StraightForce::jumped(const ForceAndMotion& now, bool empty, double noise_N) noexcept {
   State& s = state_;
   if (empty) {
@@ -98,7 +97,7 @@ bool StraightForce::step(const ForceAndMotion& now, bool empty, double noise_N) 
   s.judged = s.judged && now.free && !now.at_handle;
   s.keeps = s.keeps && !now.at_handle;
   if (jumped(now, empty, noise_N)) return true;
-  // While the handle is empty, the bias is followed, which bends the line.
+  // While the handle is empty, the bias is tracked, which bends the line.
   if (!s.judged || empty) {
     s.fit.n = 0.0;
     return false;

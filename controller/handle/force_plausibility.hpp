@@ -1,33 +1,32 @@
-// Detects forces that no hand makes, by the motion that follows them.
+// Detects forces that no hand makes, from the motion that follows them.
 //
 // ReversedForce: the sensor's sign, its mounting (turned by 180 degrees) or a joint's direction is wrong. A hand holds
 // the handle like a spring of stiffness K. If the arm moves the wrong way, this spring drives it on: M ẍ + B ẋ = +K x,
-// so that from rest both force and distance grow as e^λt. The motion is judged each time the distance from the place of
-// rest has doubled (0.5, 1, 2 … 64 mm). The force is reversed if four doublings in a row satisfy both conditions:
+// so from rest both force and distance grow as e^λt. The motion is judged at each doubling of the distance from rest
+// (0.5, 1, 2 … 64 mm). The force is reversed if four doublings in a row satisfy both conditions:
 //
-//   1. The force has grown by a factor of 1.45 to 2.1, and in the last of the four by at least 1.6. For e^λt the factor
-//      is 2; a bias on top of the force makes it less, but counts less and less. A hand whose force begins as tⁿ makes
+//   1. The force has grown by a factor of 1.45 to 2.1, and in the last doubling by at least 1.6. For e^λt the factor is
+//      2. A bias on top of the force lowers it, but matters less and less. A hand whose force begins as tⁿ gives
 //      2^(n/(n+2)): 1.26 for n = 1, when it begins to accelerate the arm, and less later; 1.52 for n = 3, when it sets
-//      out without a jerk. A force to which the arm yields makes more.
-//      Where damping takes most of the force (B > M λ, as the passivity damping can), the least factor is 1.6, since
-//      such a hand makes 2^(n/(n+1)): 1.41 for n = 1 and 1.59 for n = 2. Above some 800 Ns/m a reversed force can't be
-//      told from a hand's.
-//      In the last of the four it has grown by at least 0.85 of the largest of the four factors. A bias makes them rise
-//      towards 2; for a hand to which the arm yields they fall (2.00, 1.94, 1.51 and 1.67, once in 18 hours of a soak).
+//      out without a jerk. If the arm yields to the force, the factor is larger.
+//      If damping takes most of the force (B > M λ, possible with passivity damping), the factor must be at least
+//      1.6, since such a hand gives 2^(n/(n+1)): 1.41 for n = 1 and 1.59 for n = 2. Above some 800 Ns/m a reversed
+//      force looks like a hand's. The last factor must also be at least 0.85 of the largest. A bias makes the factors
+//      rise towards 2; for a hand to which the arm yields they fall (2.00, 1.94, 1.51, 1.67: once in 18 hours of a
+//      soak).
 //   2. The doubling has taken 0.78 to 1.05 of ln 2/λ (1 for e^λt), where λ > 0 solves M λ² + B λ = F/x.
 //
-// Measured for reversed forces, with grips of 150 to 1500 N/m: factors of 1.50 to 1.99 and times of 0.82 to 0.99. Among
-// a hundred random sessions no hand satisfies both conditions.
+// Measured for reversed forces, with grips of 150 to 1500 N/m: factors of 1.50 to 1.99, times of 0.82 to 0.99. In a
+// hundred random sessions no hand satisfied both conditions.
 //
-// StraightForce: nobody held the handle, and then a force leads the arm away that is a straight line in time, as a
-// sensor's bias makes that drifts or has jumped. A hand's force bends as the handle moves. Two signs are judged:
-//   straight   The residuals about the line, in the noisiest axis, have the variance that the noise had during the
-//              tare, to within three standard deviations of that estimate, over a distance of 10 mm. The force is at
-//              least 30 standard deviations of the noise. (10, if it is constant to 15 % and the speed has grown by
-//              half.)
-//   a jump     The force is there 30 ms after the handle was empty, and stays the same to a fifth for 10 mm. A hand
-//              needs 50 ms or more to build up its force, and it yields.
-// A load that acts at the handle may be as straight: it isn't judged.
+// StraightForce: nobody held the handle, and then a force moves the arm that is a straight line in time, like a sensor
+// bias that drifts or has jumped. A hand's force bends as the handle moves. Two patterns are detected:
+//   straight   Over a distance of 10 mm, the residuals about the line have the variance of the tare's noise, in the
+//              noisiest axis, to within three standard deviations of that estimate. The force is at least 30 standard
+//              deviations of the noise (10, if it is constant to 15 % and the speed has grown by half).
+//   jump       The force exists 30 ms after the handle was last empty, and stays the same to a fifth for 10 mm. A hand
+//              needs 50 ms or more to build up its force, and its force yields.
+// A load that acts at the handle may be just as straight, so forces that act there aren't judged.
 #pragma once
 
 #include <array>
@@ -38,8 +37,8 @@
 
 namespace proxarm::controller {
 
-// The hand's force without the tool's inertia, and the proxy after the last step. The mass is the whole one that the
-// force moves, the tool's included.
+// The hand's force without the tool's inertia, and the proxy after its last step. mass_kg is the whole moved mass, the
+// tool's included.
 struct ForceAndMotion {
   const models::Vec3& force_W;
   const models::Vec3& q_W;
@@ -47,7 +46,7 @@ struct ForceAndMotion {
   double mass_kg = 0.0, damping_Ns_per_m = 0.0;
   double period_s = 0.0;
   bool free = true;        // the proxy touches nothing
-  bool at_handle = false;  // the force acts at the handle (hand_force.hpp), so it is no sensor's bias
+  bool at_handle = false;  // the force acts at the handle (hand_force.hpp), so it isn't a sensor's bias
 };
 
 class ReversedForce {
@@ -60,12 +59,12 @@ class ReversedForce {
  private:
   static constexpr std::size_t marks = 8;
   struct State {
-    models::Vec3 rest_W = models::Vec3::Zero();  // where the proxy rested last
+    models::Vec3 rest_W = models::Vec3::Zero();  // the proxy's last place of rest
     std::array<double, marks> force_N{};         // at the distance 0.5 mm · 2^i from rest_W
-    std::array<double, marks> time_s{};          // from rest to that distance
-    double passed = 0.0;                         // number of marks passed so far
+    std::array<double, marks> time_s{};          // time from rest to that distance
+    double passed = 0.0;                         // marks passed so far
     double since_s = 0.0;
-    bool judged = false;  // the proxy has rested, and has touched nothing since
+    bool judged = false;  // the proxy has rested, and has touched nothing since then
   };
   [[nodiscard]] bool grows(std::size_t last, const ForceAndMotion& now) const noexcept;
 
@@ -75,18 +74,18 @@ class ReversedForce {
 class StraightForce {
  public:
   void start() noexcept { state_ = {}; }
-  // `empty`: nobody holds the handle. noise_N: the standard deviation of a sample, per axis. Returns true if no hand
-  // makes this force.
+  // `empty`: nobody holds the handle. noise_N: standard deviation of a sample, per axis. Returns true if no hand makes
+  // this force.
   bool step(const ForceAndMotion& now, bool empty, double noise_N) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
 
  private:
   struct State {
-    models::Vec3 rest_W = models::Vec3::Zero();  // where the handle was empty last
+    models::Vec3 rest_W = models::Vec3::Zero();  // the proxy's place when the handle was last empty
     LineFit fit;
     double first_speed_m_per_s = 0.0;
-    models::Vec3 jump_W = models::Vec3::Zero();  // the force 30 ms after the handle was empty
-    double left_s = 0.0;                         // time since the handle was empty
+    models::Vec3 jump_W = models::Vec3::Zero();  // the force 30 ms after the handle was last empty
+    double left_s = 0.0;                         // time since the handle was last empty
     bool keeps = false;                          // the force is still jump_W to within a fifth
     bool judged = false;
   };

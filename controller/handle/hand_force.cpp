@@ -11,11 +11,11 @@ using models::Vec3;
 using models::Wrench;
 
 constexpr double filter_s = 0.015;
-// Below this force, its line of action isn't known well enough: half of it would be the uncertainty of its lever.
+// Below this force the line of action isn't known well enough: its lever would be half uncertainty.
 constexpr double least_N = 0.3, least_noises = 20.0;
-// A force is what the tare has left to this share of it: the hand leaned on as the tare went on.
+// A force counts as left over from the tare within this share of it: the hand's push changed during the tare.
 constexpr double left_share = 0.3;
-constexpr double least_left = 0.3;  // of the force that is large enough for its line: the tare's mean is known better
+constexpr double least_left = 0.3;  // share of the force needed to know a line: the tare's mean is known better
 
 }  // namespace
 

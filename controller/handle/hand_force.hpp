@@ -1,26 +1,24 @@
-// What of the sensor's reading a hand can have made, and where it acts.
+// The part of the sensor's reading that a hand can have made, and the point at which it acts.
 //
-// The sensor reads  hand's wrench + weight and inertia of the tool behind it + zero. Weight and zero are off before
-// (motion/wrench_compensation.hpp). Here the tool's inertia is taken off: whatever the arm does with the tool, nobody
-// at the handle reads as nothing. The proxy renders the reading as it is, for it feels the tool's mass as its own; all
-// that asks "is that a hand?" (empty_handle.hpp, force_plausibility.hpp) asks it of this wrench.
+// The sensor reads  hand's wrench + weight and inertia of the tool behind it + zero. motion/wrench_compensation.hpp
+// removes weight and zero; HandForce removes the tool's inertia, so that an empty handle reads zero however the arm
+// moves. Only the checks whether a force is a hand's (empty_handle.hpp, force_plausibility.hpp) use this wrench; the
+// proxy feels the tool's mass as its own.
 //
-// The tool's acceleration is the proxy's behind three equal first-order lags, which together are as long as the way
-// from the proxy to the steel: filter of the setpoints, drives, two periods. Encoders would tell it as well, but their
-// counts, differentiated twice, may read as more than the hand of a child. What is left is the gears' ringing.
+// Three equal first-order lags estimate the tool's acceleration from the proxy's. Their sum is the delay from the proxy
+// to the real arm: setpoint filter, drives and two periods. Encoder counts, differentiated twice, may read as more than
+// a child's force. The ringing of the gears remains in the estimate.
 //
-// A force acts at the handle if its line passes the handle's point: |τ| <= r |F|. A load or a hand may do so; an offset
-// of the sensor does so by chance alone, since it has no lever: τ = −p × F, p being the handle from the sensor. So a
-// force acts at the handle if its torque is at most a third of that, too. It can be told where |p × F| is three times
-// what isn't known of τ.
+// A force acts at the handle if its line passes close to the handle's point: |τ| ≤ r |F|. A hand or a load may do so. A
+// sensor's offset has no lever, τ = −p × F (p: handle from sensor), so |τ| must also be at most a third of |p × F|. The
+// decision needs |p × F| of at least three times the uncertainty of τ. A force acts as an offset if its line passes the
+// sensor's origin, within that uncertainty.
 //
-// It acts as an offset if its line passes the sensor's origin, as well as that can be told.
+// A hand that pushes during the tare becomes part of the zero. When it lets go, the opposite of its force remains, and
+// acts at the handle. So a force that equals the difference between tare and known zero acts neither at the handle nor
+// as an offset.
 //
-// A hand that pushed while the sensor was tared, and was taken for its zero, leaves the opposite of its force when it
-// lets go, and that acts at the handle as it did. So a force that is what the tare differs from the known zero by is
-// none that can be told.
-//
-// Neither allocates, locks nor throws.
+// No function allocates, locks or throws.
 #pragma once
 
 #include <algorithm>
@@ -30,24 +28,24 @@
 
 namespace proxarm::controller {
 
-// What moves behind the sensor.
+// The mass behind the sensor.
 struct HeldTool {
   double mass_kg = 0.0;
-  models::Vec3 centre_S = models::Vec3::Zero();  // of mass, from S's origin
-  models::Vec3 handle_S = models::Vec3::Zero();  // the handle's point T, from S's origin
+  models::Vec3 centre_S = models::Vec3::Zero();  // centre of mass, from S's origin
+  models::Vec3 handle_S = models::Vec3::Zero();  // handle point T, from S's origin
 };
 
-// How far beside the handle's point a load's line of action may pass. A hand's is a few millimetres to centimetres off;
-// an offset's is as far off as the handle is from the sensor.
+// Largest distance at which a load's line of action may pass the handle's point. A hand's line is a few millimetres to
+// centimetres off; an offset's is off by the distance from handle to sensor.
 inline constexpr double beside_handle_m = 0.02;
-// How well a force's line is known: a sensor that is mounted 1 degree off, and a handle that is 2 mm from where the
-// cell has it, make 4 mm at 0.1 m.
+// Uncertainty of a force's line: a sensor mounted 1 degree off and a handle 2 mm from its place in the cell file give 4
+// mm at 0.1 m.
 inline constexpr double known_line_m = 0.004;
-// A sensor's noise of torque is at most this times that of its force.
+// A sensor's torque noise is at most this times its force noise.
 inline constexpr double noise_lever_m = 0.1;
 
-// Whether a wrench about T's origin acts at the handle, and not as an offset of the sensor would. `handle` is from the
-// sensor, in the wrench's frame; `noise_N` is the standard deviation of the force.
+// Whether a wrench about T's origin acts at the handle, unlike a sensor's offset. `handle`: from the sensor, in the
+// wrench's frame. `noise_N`: standard deviation of the force.
 inline bool acts_at_handle(const models::Wrench& wrench, const models::Vec3& handle, double noise_N) noexcept {
   constexpr double deviations = 4.0, telling = 3.0;
   const double force_N = wrench.force.norm(), noise_Nm = deviations * noise_lever_m * noise_N;
@@ -56,7 +54,7 @@ inline bool acts_at_handle(const models::Wrench& wrench, const models::Vec3& han
   return wrench.torque.norm() <= std::min(beside_handle_m * force_N, offset_Nm / telling) + noise_Nm;
 }
 
-// Whether a wrench about T's origin acts at the sensor's origin, as its offset does.
+// Whether a wrench about T's origin acts at the sensor's origin, like a sensor's offset. Arguments as above.
 inline bool acts_as_offset(const models::Wrench& wrench, const models::Vec3& handle, double noise_N) noexcept {
   constexpr double deviations = 4.0, telling = 3.0;
   const double known_Nm = std::max(known_line_m * wrench.force.norm(), deviations * noise_lever_m * noise_N);
@@ -66,29 +64,29 @@ inline bool acts_as_offset(const models::Wrench& wrench, const models::Vec3& han
 
 class HandForce {
  public:
-  // `lag_s`: from the proxy to the steel.
+  // `lag_s`: delay from the proxy to the real arm.
   HandForce(const HeldTool& tool, double lag_s, double period_s) noexcept
       : tool_(tool), lag_s_(lag_s), period_s_(period_s) {}
 
   void start() noexcept { state_ = {}; }
-  // The lag depends on the period, too.
+  // The lag depends on the period.
   void set_period(double period_s, double lag_s) noexcept {
     period_s_ = period_s;
     lag_s_ = lag_s;
   }
   void set_tool(const HeldTool& tool) noexcept { tool_ = tool; }
-  // Once in each cycle. reading_W: about T's origin, without bias and tool weight; v_W: the proxy's, in its last step;
-  // beside_zero_S: by which the tare differs from the known zero.
+  // Call once per cycle. reading_W: about T's origin, without bias and tool weight. v_W: the proxy's, in its last step.
+  // beside_zero_S: the tare less the known zero.
   void step(const models::Wrench& reading_W, const models::Mat3& R_WS, const models::Vec3& v_W, double noise_N,
             const models::Vec3& beside_zero_S) noexcept;
 
-  // Without the tool's inertia.
+  // The hand's wrench without the tool's inertia.
   [[nodiscard]] const models::Wrench& wrench_W() const noexcept { return state_.wrench_W; }
-  // What moves it acts at the handle, as a load or a hand does, and is large enough to tell.
+  // The force acts at the handle, like a hand or a load, and is large enough to decide this.
   [[nodiscard]] bool at_handle() const noexcept { return state_.at_handle; }
-  // What moves it acts at the sensor's origin, and is large enough to tell.
+  // The force acts at the sensor's origin, and is large enough to decide this.
   [[nodiscard]] bool as_offset() const noexcept { return state_.as_offset; }
-  // It is what a hand that is gone left in the tare.
+  // The force is left over from a hand that pushed during the tare.
   [[nodiscard]] bool left_by_tare() const noexcept { return state_.left_by_tare; }
   [[nodiscard]] double tool_mass_kg() const noexcept { return tool_.mass_kg; }
 

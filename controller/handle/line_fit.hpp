@@ -7,9 +7,9 @@
 
 namespace proxarm::controller {
 
-// The sums over the samples since the line began. A plain struct, archived with its owner. Empty: n = 0.
+// Sums over the samples since the line began; n = 0: no samples. A plain struct, archived with its owner.
 struct LineFit {
-  models::Vec3 first_W = models::Vec3::Zero();  // the first force; subtracted in all sums
+  models::Vec3 first_W = models::Vec3::Zero();  // first force; subtracted in all sums
   models::Vec3 h = models::Vec3::Zero(), th = models::Vec3::Zero(), hh = models::Vec3::Zero();
   double n = 0.0, t = 0.0, tt = 0.0;
 
@@ -26,12 +26,12 @@ struct LineFit {
   }
 };
 
-// The line's figures. Precondition: at least three samples, one every period_s.
+// Results of the fit. Precondition: at least three samples, one every period_s.
 struct FittedLine {
   models::Vec3 end_W;        // the line at the last sample
   models::Vec3 risen_W;      // the line's rise since the first sample
-  models::Vec3 variance_N2;  // of the residuals
-  double deviation = 0.0;    // relative standard deviation of this estimate of the variance
+  models::Vec3 variance_N2;  // variance of the residuals
+  double deviation = 0.0;    // relative standard deviation of the estimated variance
 };
 
 // b = (n Σth − Σt Σh)/(n Σtt − (Σt)²),  a = (Σh − b Σt)/n,  residual variance: (Σhh − a Σh − b Σth)/(n − 2).
@@ -45,8 +45,8 @@ inline FittedLine fitted(const LineFit& s, double period_s) noexcept {
           .deviation = std::sqrt(2.0 / (s.n - 2.0))};
 }
 
-// Whether the residuals exceed noise of the standard deviation `noise_N`, to within `deviations` standard deviations of
-// the variance's estimate, and a motion of `swing_N` besides. A variance that is NaN counts as bent.
+// Whether the residuals are larger than the noise (standard deviation noise_N), by more than `deviations` standard
+// deviations of the estimated variance plus a motion of swing_N. A NaN variance counts as bent.
 inline bool bends(const FittedLine& line, double noise_N, double deviations, double swing_N = 0.0) noexcept {
   return !(line.variance_N2.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * line.deviation) + swing_N * swing_N);
 }

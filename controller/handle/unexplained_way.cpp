@@ -8,14 +8,14 @@ namespace {
 
 using models::Vec3;
 
-// An arm with nobody at the handle may move 5 cm: twice this distance, and the braking distance.
+// With nobody at the handle the arm may move 5 cm: twice this distance plus the braking distance.
 constexpr double longest_way_m = 0.02;
-// The line is tested every 10 samples. If it were tested at each one, chance would reject a good line now and then.
+// The line is tested every 10 samples. A test at each sample would now and then reject a good line by chance.
 constexpr double looks = 10.0, deviations = 4.0;
-// As a share of the force. A hand of 100 N/m changes its force by 2 N over the allowed distance; the oscillation of the
-// tool behind the sensor is 6 % of the force at first and decays.
+// Share of the force. A hand of 100 N/m changes its force by 2 N over the allowed distance. The tool behind the sensor
+// oscillates by 6 % of the force at first, and the oscillation decays.
 constexpr double share = 0.02;
-// The noise that is assumed if the sensor's isn't known.
+// Assumed noise if the sensor's is unknown.
 constexpr double least_noise_N = 0.005;
 constexpr double rest_m_per_s = 0.01, seen_s = 0.02;
 constexpr double small_N = 1.5, same_share = 0.2, accelerated_share = 0.5, long_s = 1.0;

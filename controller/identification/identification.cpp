@@ -14,10 +14,10 @@ using models::Mat3;
 using models::Vec3;
 
 constexpr double twist_known_to = 0.2, friction_share = 0.02, linearity = 1e-3, resolution_share = 1e-3;
-// The gears' twist by the tool is some milliradians, known to a hundredth after the first round and to 1e-4 after that.
+// The tool twists the gears by some milliradians, known to a hundredth after the first round, then to 1e-4.
 constexpr int rounds = 3;
 
-// Where links and gears were in each pose.
+// Angles of links and twists of gears in a pose.
 struct Stand {
   JointVector link_rad, twist_rad;
 };
@@ -31,8 +31,8 @@ std::vector<Stand> stands_of(const models::Arm& arm, const std::vector<proof::Re
   return stands;
 }
 
-// By how much the sensor may be tilted otherwise in one pose than in another. What is the same in all poses, the twist
-// of an axis that carries the whole arm, is a mounting error of the base.
+// How differently the sensor may be tilted in one pose than in another. A tilt common to all poses, as by the axis that
+// carries the arm, counts as a mounting error of the base.
 class Tilts {
  public:
   Tilts(const description::Cell& cell, const models::Arm& arm, const std::vector<proof::Reading>& readings,
@@ -65,15 +65,15 @@ class Tilts {
   std::vector<bool> turns_;
 };
 
-// The standard deviation of a mean of n samples, from their steps Σ(xᵢ₊₁ − xᵢ)²: with white noise σ² = Σ/2(n − 1), and
-// the mean is known to σ/√n. Behind the sensor's low-pass neighbours are alike, φ = e^(−2π f T): steps are smaller,
-// σ²(1 − φ), and the mean is known to σ √((1 + φ)/((1 − φ) n)). A hand that sways slowly makes few steps, and is
-// therefore not taken for noise.
+// The standard deviation of the mean of n samples, from their steps Σ(xᵢ₊₁ − xᵢ)²: for white noise σ² = Σ/2(n − 1), and
+// the mean's deviation is σ/√n. Behind the sensor's low-pass, neighbours are correlated, φ = e^(−2π f T): steps are
+// smaller, σ²(1 − φ), and the mean's deviation is σ √((1 + φ)/((1 − φ) n)). A slowly swaying hand makes small steps and
+// so doesn't count as noise.
 double deviation_of_mean(const Vec3& step_squares, const proof::Reading& reading, double bandwidth_Hz) {
   const double n = reading.samples;
   if (n < 2.0) return 0.0;
   const double decay = 2.0 * std::numbers::pi * bandwidth_Hz * reading.lasted_s / n;
-  // A sensor that filters more slowly than that over the whole reading has one sample, not n.
+  // If the sensor's filter is slower than the whole reading, this is one sample, not n.
   const double phi = bandwidth_Hz > 0.0 ? std::exp(-std::max(decay, 1.0 / n)) : 0.0;
   const double variance = step_squares.mean() / (2.0 * (n - 1.0) * (1.0 - phi));
   return std::sqrt(variance * (1.0 + phi) / ((1.0 - phi) * n));
@@ -141,7 +141,7 @@ ToolFit identify_tool(const description::Cell& cell, const std::vector<proof::Re
     if (!fit.centre_found) continue;
     Eigen::Map<Vec3>(with_tool.tool.centre_of_mass_S_m.data()) = fit.centre_S_m;
   }
-  // What may be nothing has no centre.
+  // A mass that may be zero has no centre.
   if (fit.mass_kg <= fit.mass_half_kg) fit.centre_found = false;
   return fit;
 }

@@ -12,12 +12,12 @@ using models::Mat3;
 using models::Vec3;
 
 constexpr std::size_t least_readings = 3;
-// A direction that shows something: the mounting error is a fifth of it at most.
+// A direction is identifiable if the mounting error is at most a fifth of the spread along it.
 constexpr double spread_over_mounting = 5.0;
-// The steps of Gauss-Newton are products of mounting errors, a hundredth each: four leave 1e-8 of the first.
+// Gauss-Newton's steps shrink like products of mounting errors, a hundredth each: four steps leave 1e-8.
 constexpr int steps = 6;
 
-// No tool's centre is much further away. It matters where nothing hangs there, which would leave c without any bound.
+// Standard deviation of c, m: no tool's centre is much further away. Without a tool, c would otherwise be unbounded.
 constexpr double far_m = 1.0;
 
 // Unknowns of the forces: m, b, d, ε, δ. Of the torques: c, b', d'.
@@ -47,16 +47,17 @@ struct Normal {
     A += weight * J.transpose() * J;
     a += weight * J.transpose() * r;
   }
-  // Three unknowns from `first` on are 0 but for this standard deviation; now they are `x`. 0: they are 0.
+  // Three unknowns from `first` on, now `x`, are expected to be 0 with this standard deviation; a deviation of 0 fixes
+  // them.
   void expect_zero(int first, const Vec3& x, double deviation) {
-    constexpr double surely = 1e-9;  // N, Nm, rad: far below what any sensor tells
+    constexpr double surely = 1e-9;  // N, Nm, rad: far below any sensor's accuracy
     const double weight = 1.0 / std::max(deviation * deviation, surely * surely);
     for (int i = 0; i < 3; ++i) {
       A(first + i, first + i) += weight;
       a[first + i] -= weight * x[i];
     }
   }
-  // The unknowns have units of their own: the matrix is scaled to a diagonal of 1 before it is factored.
+  // The unknowns have different units, so the matrix is scaled to a unit diagonal before factoring.
   [[nodiscard]] Eigen::Matrix<double, N, N> scale() const {
     return A.diagonal().cwiseSqrt().cwiseInverse().asDiagonal();
   }
@@ -109,7 +110,7 @@ class Fit {
     const Vec3 drift = x_.segment<3>(of_drift), sensor = x_.segment<3>(of_sensor), base = x_.segment<3>(of_base);
     found.force.chi_squared += prior(drift, allowances_.zero_drift_N) + prior(sensor, allowances_.mounting_rad) +
                                prior(base, allowances_.mounting_rad);
-    // Nine of the rows are expectations of nine of the unknowns.
+    // Nine rows are the expectations of nine unknowns.
     const double nu = 3.0 * static_cast<double>(readings_.size()) + 9.0 - force_unknowns;
     found.force.most = most_chi_squared(nu);
     const auto deviation = normal.covariance().diagonal().cwiseSqrt().eval();
@@ -127,7 +128,7 @@ class Fit {
     Normal<torque_unknowns> normal;
     const double drift_Nm = lever_m * allowances_.zero_drift_N;
     Eigen::Matrix<double, torque_unknowns, 1> y = Eigen::Matrix<double, torque_unknowns, 1>::Zero();
-    for (int n = 0; n < 2; ++n) {  // the second time with a lever that is known
+    for (int n = 0; n < 2; ++n) {  // the second time with the lever known
       lever_now_m_ = y.segment<3>(of_centre).norm();
       normal = {};
       for (const PoseReading& reading : readings_) {
@@ -158,7 +159,7 @@ class Fit {
     const double last_s = readings_.back().time_s, all_s = last_s - readings_.front().time_s;
     return all_s > 0.0 ? (reading.time_s - last_s) / all_s : 0.0;
   }
-  // The weight of a kilogram in S, mounting errors included.
+  // The weight of one kilogram in S, including mounting errors.
   [[nodiscard]] Vec3 weight_of_1_kg(const PoseReading& reading) const {
     return turned(x_.segment<3>(of_sensor)) * (reading.R_SW * (turned(x_.segment<3>(of_base)) * gravity_W_));
   }
@@ -172,13 +173,13 @@ class Fit {
   [[nodiscard]] double force_deviation(const PoseReading& reading) const {
     return std::hypot(reading.noise_N, reading.tilt_rad * weight_N());
   }
-  // The force's noise comes in with the weight that is read.
+  // The measured weight adds the force's noise.
   [[nodiscard]] double torque_deviation(const PoseReading& reading) const {
     const double by_force_Nm = lever_now_m_ * reading.noise_N;
     return std::hypot(reading.noise_Nm, by_force_Nm, lever_m * reading.tilt_rad * weight_N());
   }
 
-  // m and b alone, all readings alike: F_k − F̄ = m (u_k − ū).
+  // m and b alone, with equal weights: F_k − F̄ = m (u_k − ū).
   void start() {
     Vec3 force_mean = Vec3::Zero(), u_mean = Vec3::Zero();
     const double count = static_cast<double>(readings_.size());
@@ -193,7 +194,7 @@ class Fit {
       squares += u.squaredNorm();
     }
     x_.setZero();
-    x_[of_mass] = both / squares;  // above 0: shows_mass()
+    x_[of_mass] = both / squares;  // above 0 by shows_mass()
     x_.segment<3>(of_zero) = force_mean - x_[of_mass] * u_mean;
   }
 

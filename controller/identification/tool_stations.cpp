@@ -18,11 +18,11 @@ using models::Vec3;
 using proof::Station;
 
 constexpr std::size_t wrist_joints = 3;
-// Seven poses beside the first are 27 readings of a force for 13 unknowns; 5,040 rounds are all tried. Five are the
-// least that are worth the name.
+// Seven poses in addition to the first give 27 force readings for 13 unknowns; all 5,040 rounds can be tried. Fewer
+// than five aren't enough.
 constexpr std::size_t chosen = 7, least_chosen = 5;
-constexpr double shares[] = {1.0, 0.5, 0.25, 0.125};  // of most_turn_rad, that a joint is tried to be turned by
-// Two poses of which one shows nothing more than the other: the weight's directions are this close.
+constexpr double shares[] = {1.0, 0.5, 0.25, 0.125};  // shares of most_turn_rad that are tried for a joint
+// Poses whose weight directions are closer than this count as the same.
 constexpr double same = 1e-6;
 
 std::vector<Eigen::Index> wrist_of(const models::Arm& arm) {
@@ -39,8 +39,8 @@ Vec3 down_in_sensor(const description::Cell& cell, const models::Arm& arm, const
   return arm.sensor_pose(arm.link_from_motor(motor_rad)).linear().transpose() * down_W;
 }
 
-// By how much a joint alone can be turned to one side. A drive may be off by the following error without a fault, so
-// ends of ranges are kept by that.
+// How far a joint alone can turn to one side. A margin of the following error is kept to the ends of ranges, since a
+// drive may deviate by that without a fault.
 double turn_of(const description::Cell& cell, const models::Arm& arm, const JointVector& start, Eigen::Index joint,
                double side) {
   const auto& range = cell.drives[static_cast<std::size_t>(joint)].range_rad;
@@ -54,8 +54,8 @@ double turn_of(const description::Cell& cell, const models::Arm& arm, const Join
   return 0.0;
 }
 
-// All poses of the grid that the arm can go to from where it is, and back: each joint as far as it can be turned alone,
-// and half as far.
+// All poses of the grid that the arm can reach from its pose and return from: each joint by its full turn and by half
+// of it.
 std::vector<JointVector> candidates(const description::Cell& cell, const models::Arm& arm, const JointVector& start) {
   std::vector<JointVector> poses{start};
   for (const Eigen::Index joint : wrist_of(arm)) {
@@ -73,7 +73,6 @@ std::vector<JointVector> candidates(const description::Cell& cell, const models:
   return poses;
 }
 
-// Scatter of some directions about their mean.
 Mat3 scatter_of(const std::vector<Vec3>& directions) {
   Vec3 sum = Vec3::Zero();
   Mat3 squares = Mat3::Zero();
@@ -84,14 +83,14 @@ Mat3 scatter_of(const std::vector<Vec3>& directions) {
   return squares - sum * sum.transpose() / static_cast<double>(directions.size());
 }
 
-// Adds to the start those that make the determinant largest.
+// Adds to the start the poses that maximise the determinant.
 std::vector<JointVector> best_of(const description::Cell& cell, const models::Arm& arm, const JointVector& start) {
   const std::vector<JointVector> poses = candidates(cell, arm, start);
   std::vector<Vec3> shown;
   for (const JointVector& pose : poses) shown.push_back(down_in_sensor(cell, arm, pose));
   std::vector<JointVector> taken{start};
   std::vector<Vec3> directions{down_in_sensor(cell, arm, start)};
-  // Where few directions are there to be shown, the determinant is that of those that are.
+  // If the directions span fewer than three dimensions, the determinant is taken over these dimensions.
   constexpr double little = 1e-4;
   for (std::size_t n = 0; n < chosen; ++n) {
     double most = 0.0;
@@ -112,7 +111,7 @@ std::vector<JointVector> best_of(const description::Cell& cell, const models::Ar
   return taken;
 }
 
-// Paths between poses, and how far the joint goes that goes furthest; infinite where the way isn't free.
+// The largest joint motion between each two poses; infinite if the path isn't free.
 Eigen::MatrixXd ways(const description::Cell& cell, const models::Arm& arm, const std::vector<JointVector>& poses) {
   const auto count = static_cast<Eigen::Index>(poses.size());
   Eigen::MatrixXd way = Eigen::MatrixXd::Zero(count, count);
@@ -126,8 +125,8 @@ Eigen::MatrixXd ways(const description::Cell& cell, const models::Arm& arm, cons
   return way;
 }
 
-// The shortest round through all poses from the first and back; by way of the first each time if there is none, which
-// is free by candidates().
+// The shortest free round through all poses, from the first and back. If there is none, the arm returns to the first
+// pose each time; these paths are free by candidates().
 std::vector<std::size_t> round_of(const Eigen::MatrixXd& way) {
   std::vector<std::size_t> order(static_cast<std::size_t>(way.rows() - 1)), best;
   std::iota(order.begin(), order.end(), std::size_t{1});

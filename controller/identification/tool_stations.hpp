@@ -1,10 +1,10 @@
-// Where the arm stands to have its tool identified: poses of the wrist that turn the weight in S as many ways as its
-// ranges and borders let it.
+// Chooses the poses for identifying the tool: the wrist turns the weight in S as differently as ranges and limits
+// allow.
 //
-// Only the outermost three joints that turn are moved, each by most_turn_rad at most from where the arm was found. Of a
-// grid of such poses those are taken, one after the other, that make the determinant of the scatter of R_SW g largest
-// (D-optimal design). They are visited on the shortest round, which ends where it began: what the zero has drifted
-// meanwhile shows there. The path of the rendered point between two poses keeps out of what the cell's limits forbid.
+// Only the outermost three revolute joints move, each by at most most_turn_rad from its first angle. From a grid of
+// such poses, those are chosen one by one that maximise the determinant of the scatter of R_SW g (D-optimal design).
+// The arm visits them on the shortest closed round, so the sensor's drift shows at its end. On the way the rendered
+// point stays within the cell's limits.
 #pragma once
 
 #include <vector>
@@ -17,8 +17,8 @@ namespace proxarm::identification {
 
 inline constexpr double most_turn_rad = 0.9;
 
-// The stations from the motors' angles `motor_rad` on, the first and the last of them there. Throws SetupError if
-// borders leave too few. If no joint turns the weight, or none turns at all, the only station is the first.
+// Returns the stations; the first and the last are at the motors' angles `motor_rad`. Throws SetupError if limits leave
+// too few. If no joint turns the weight, or no joint turns at all, the first station is the only one.
 std::vector<proof::Station> tool_stations(const description::Cell& cell, const models::Arm& arm,
                                           const models::JointVector& motor_rad);
 

@@ -15,8 +15,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Per axis a TPDO and a setpoint; SYNC and heartbeats, the sensor's poll and frames; and as many again for what else is
-// said on the buses.
+// A TPDO and a setpoint per axis; SYNC, heartbeats, the sensor's poll and frames; doubled for other traffic on the
+// buses.
 std::size_t frames_per_cycle(const description::Cell& cell) { return 2 * (2 * cell.drives.size() + 8); }
 
 template <std::size_t N>

@@ -15,26 +15,26 @@
 
 namespace proxarm::controller {
 
-// What BlackBox is made with.
+// The arguments of BlackBox.
 struct BoxSize {
   double period_s;
   std::size_t frames_per_cycle;
 };
-// A session whose timestep may change needs room for the cycles of 1 ms.
+// If the timestep may change, the box has room for cycles down to 1 ms.
 BoxSize box_size(const command_line::PreparedSession& session, bool timestep_may_change);
 
-// That of --black-box, else within that of --record; empty: neither is given.
+// The folder of --black-box, else one in the folder of --record; empty: neither is given.
 std::filesystem::path black_box_folder(const command_line::RunOptions& options);
 
-// The head of the session's replay: all but first cycle and state. Throws SetupError.
+// Returns the head of the session's replay, without first cycle and state. Throws SetupError.
 ReplayHead replay_head(const command_line::PreparedSession& session, const std::vector<std::string>& bus_names,
                        const BusIndices& indices);
-// All files that the controller was made from.
+// Returns all files from which the controller was made.
 std::vector<std::filesystem::path> replay_files(const command_line::PreparedSession& session);
 
 enum class Replay : std::uint8_t { none, kept };
 
-// All that is left of the session's last seconds. Throws SetupError.
+// Writes the last seconds of the session to `folder`. Throws SetupError.
 void write_black_box(const std::filesystem::path& folder, const BlackBox& box, const ReplayHead& head,
                      const command_line::PreparedSession& session, const std::string& reason,
                      Replay replay = Replay::kept);

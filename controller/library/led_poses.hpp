@@ -1,5 +1,5 @@
-// Whether the loop is stable in the poses that a session is led through: at the start only the start pose was judged.
-// Out of the session's records, in a thread of its own (pose_watch.hpp). Of the admittance type.
+// Judges whether the loop is stable in the poses that a session is led through; at the start only the start pose was
+// judged. Works on the session's records, in a separate thread (pose_watch.hpp). Precondition: admittance type.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@ namespace proxarm::controller {
 
 class LedPoses {
  public:
-  // All must outlive it.
+  // Precondition: all arguments outlive this object.
   LedPoses(const command_line::PreparedSession& session, const command_line::RunOptions& options,
            const SignalDeriver& deriver);
 
-  // Every record, in order.
+  // Takes every record, in order.
   void add(const CycleRecord& record);
   // Whether most samples of the last quarter of a second were late: the loop is judged with their age then.
   [[nodiscard]] bool samples_late() const noexcept { return samples_late_; }
@@ -37,11 +37,11 @@ class LedPoses {
   const command_line::RunOptions& options_;
   const SignalDeriver& deriver_;
   PoseWatch watch_;
-  LoopModel loop_;  // of the present timestep, with samples that are in time
+  LoopModel loop_;  // of the present timestep, with samples in time
   std::int64_t period_ns_ = 0;
-  double late_share_ = 0.0;  // of the sensor's samples, lately
+  double late_share_ = 0.0;  // recent share of late samples
   bool samples_late_ = false;
-  double user_damping_Ns_per_m_ = 0.0;  // without what passivity adds
+  double user_damping_Ns_per_m_ = 0.0;  // without the damping that passivity adds
 };
 
 }  // namespace proxarm::controller

@@ -11,7 +11,7 @@ namespace {
 
 using description::SetupError;
 
-// What only the program can do, and what a session of one's own has in its place.
+// An option of the program alone, and what a session offers instead.
 struct OfTheProgram {
   const char* name;
   const char* expected;
@@ -48,15 +48,15 @@ void refuse_what_is_the_programs(const std::string& option, const OptionValue& v
   throw SetupError({.key = option, .found = given, .expected = found->expected, .advice = found->advice});
 }
 
-// A time is written with its unit on the command line; what else is a number there is in SI units without one.
+// The command line wants a unit with a time; it takes all other numbers in SI units without one.
 std::string text_of(const std::string& text, bool is_number, const std::string& type) {
   const bool time = type.find("TIME") != std::string::npos && type.find('@') == std::string::npos;
   return is_number && time ? text + "s" : text;
 }
 
-constexpr const char* flag = "";  // the type of an option that takes nothing
+constexpr const char* flag = "";  // the type of an option without a value
 
-// `type`: what the option takes. What doesn't fit is left to the table, which refuses it.
+// `type`: what the option takes. The table refuses values that don't fit.
 void add_words(std::vector<std::string>& words, const std::string& option, const OptionValue& value,
                const std::string& type) {
   if (value.is_on()) return words.push_back(option);
@@ -67,7 +67,7 @@ void add_words(std::vector<std::string>& words, const std::string& option, const
   for (const std::string& given : value.texts()) {
     const std::string text = text_of(given, value.is_number(), type);
     if (option == "cell") {
-      words.insert(words.end(), {"--", text});  // the last: see below
+      words.insert(words.end(), {"--", text});  // goes last, see run_options()
     } else if (text.empty()) {
       words.insert(words.end(), {option, text});
     } else {

@@ -1,10 +1,9 @@
-// What a session of a program of one's own is asked for: the options of `proxarm run`, by the names that they have
-// there.
+// Options of a session in your own program: the options of `proxarm run`, by their names there.
 //
 //   {{"scene", "scenes/wall.yaml"}, {"mass", 5.0}, {"duration", 6.0}, {"fault", {"axis_2:silent@2s"}}}
 //
-// The command line's own table reads them (command_line/options/run_words.hpp): it knows their values, and it refuses
-// with its words what it doesn't know.
+// The command line's table reads them (command_line/options/run_words.hpp), so names, values and error messages are the
+// command line's.
 #pragma once
 
 #include <concepts>
@@ -18,8 +17,8 @@
 
 namespace proxarm {
 
-// A number in SI units; a text as on the command line, such as "4kg"; several of an option that may be repeated; true
-// of one that takes nothing. False is as if the option weren't there.
+// A number is in SI units; a text is as on the command line, such as "4kg". A list is for an option that may be
+// repeated, true for an option without a value. False leaves the option out.
 class OptionValue {
  public:
   OptionValue(bool on) : kind_(on ? Kind::on : Kind::off) {}
@@ -43,14 +42,14 @@ class OptionValue {
   std::vector<std::string> texts_;
 };
 
-// `name` without its hyphens in front; within it a hyphen or an underscore: "extra-delay" and "extra_delay" are one.
-// The cell's file, which has no name on the command line, is "cell".
+// `name` has no leading hyphens; "extra-delay" and "extra_delay" are the same option. The cell's file, a positional
+// argument of the command line, is "cell".
 struct SessionOption {
   std::string name;
   OptionValue value;
 };
 
-// No vector: of one option with a text, {{"scene", "scenes/wall.yaml"}}, that would take the two for iterators.
+// A class instead of a vector: a vector would take {{"scene", "scenes/wall.yaml"}} for a pair of iterators.
 class SessionOptions {
  public:
   SessionOptions() = default;
@@ -64,8 +63,8 @@ class SessionOptions {
   std::vector<SessionOption> options_;
 };
 
-// What the command line makes of them. Throws SetupError, with its words; also for options that only the program has:
-// those of a real arm, of the view, and of what it prints.
+// Returns what the command line makes of these options. Throws SetupError with the command line's words, also for
+// options of the program alone: a real arm, the view, and what is printed.
 command_line::RunOptions run_options(const SessionOptions& options);
 
 }  // namespace proxarm

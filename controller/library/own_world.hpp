@@ -1,4 +1,4 @@
-// A world of one's own that says more of its contacts than a GeometricAlgorithm<3> can.
+// A world of your own that names its objects and places its contacts, which a GeometricAlgorithm<3> cannot.
 #pragma once
 
 #include <span>
@@ -9,14 +9,14 @@
 
 namespace proxarm {
 
-// A world says by contacts() what touches: without any, the proxy counts as free, whatever force acts on it, so a
-// detent or a medium is no touch. Contacts name their object by its index among objects().
+// contacts() says what touches. Without contacts the proxy counts as free, whatever force acts on it: a detent or a
+// medium is no touch. A contact's object is an index of objects().
 class OwnWorld : public models::GeometricAlgorithm<3> {
  public:
-  // Empty: its contacts have numbers only.
+  // The names of the objects; empty: contacts have numbers only.
   [[nodiscard]] virtual std::vector<std::string> objects() const { return {}; }
 
-  // Where those of contacts() are, in W and in their order. Of those without one: where the proxy is.
+  // The points of contacts() in W, in their order. Contacts without a point are at the proxy.
   [[nodiscard]] virtual std::span<const models::Vec3> contact_points_W() const noexcept { return {}; }
 };
 

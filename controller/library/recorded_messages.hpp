@@ -1,4 +1,4 @@
-// session.mcap in the folder of a record, with the stage that it is told on.
+// Writes session.mcap, with its stage, into a record's folder.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +13,7 @@ class RecordedMessages {
  public:
   // Throws SetupError.
   RecordedMessages(const std::filesystem::path& folder, const command_line::PreparedSession& session);
-  // As SessionOutput::add() returns it.
+  // Takes a record that is complete, as SessionOutput::add() returns it.
   void add(const CycleRecord& completed) { record_.add(completed); }
   void drain(const BoxReader& box) { record_.drain(box); }
   void finish() { record_.finish(); }

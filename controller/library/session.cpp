@@ -36,12 +36,11 @@ PreparedSession prepared_session(const RunOptions& options) {
   return session;
 }
 
-// Whatever is asked of a session while none runs.
 [[noreturn]] void refuse_asking(const std::string& line) {
   throw SetupError({.found = description::in_quotes(line), .expected = "a session that runs to ask it of"});
 }
 
-// From power on to power off, with all that is made for it.
+// One session, from power on to power off.
 class OneRun {
  public:
   OneRun(const PreparedSession& session, const RunOptions& options, const controller::OwnParts& own);
@@ -129,7 +128,7 @@ void OneRun::look(CycleRecord record, const sim::Truth& truth, const LookAtRecor
   if (each) each(record);
 }
 
-// The contacts of the step that the record is of: the cycle's records are seen before the next step.
+// The world still has the contacts of the record's step: each record is seen before the next step.
 void OneRun::place_contacts(CycleRecord& record) const {
   if (world_ == nullptr) return;
   const std::span<const Vec3> points_W = world_->contact_points_W();
@@ -194,7 +193,7 @@ Summary Session::State::run(const LookAtRecord& each) {
   thrown = nullptr;
   stop_asked = false;
   OneRun run(session, options, parts);
-  // Nobody asks anything of a run that is gone, whatever it ended by.
+  // ask() must not reach a run that has ended, or has thrown.
   struct Running {
     State& state;
     Running(State& of, OneRun& one) : state(of) { state.set_running(&one); }

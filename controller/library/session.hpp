@@ -3,10 +3,9 @@
 //   proxarm::Session session({{"scene", "scenes/wall.yaml"}, {"mass", 4.0}});
 //   const proxarm::Summary summary = session.run([](const proxarm::CycleRecord& cycle) { … });
 //
-// It takes the options of `proxarm run` (options.hpp), is assembled and checked as that does it, refuses what that
-// refuses, with the same words, and moves the arm to the same setpoints, to the bit. World, hand, force sensor and
-// drives can be one's own (docs/library.md). A real arm is run by the command line alone, which has its supervision,
-// consent and clocks.
+// It takes the options of `proxarm run` (options.hpp), is assembled and checked by the same code, refuses the same with
+// the same words, and commands the same setpoints, to the bit. World, hand, force sensor and drives can be your own
+// (docs/library.md). Only the command line runs a real arm, with its supervision, consent and clocks.
 #pragma once
 
 #include <array>
@@ -34,8 +33,8 @@ using models::Vec3;
 
 class Session {
  public:
-  // Files that aren't there by their name are looked for among those that come with proxarm; PROXARM_DATA says where
-  // these are, if they aren't where they were installed. Throws SetupError. Opens and starts nothing.
+  // A file that doesn't exist is looked up among those that come with proxarm: where they were installed, or below
+  // PROXARM_DATA. Throws SetupError. Opens and starts nothing.
   explicit Session(const SessionOptions& options = {});
   ~Session();
   Session(Session&&) noexcept;
@@ -43,7 +42,7 @@ class Session {
 
   // ---- before run(); each returns the session
 
-  // In the place of the scene: 𝒢 in W; an OwnWorld says more of its contacts. It must outlive the session. Not with a
+  // In the place of the scene: 𝒢 in W; an OwnWorld also names its objects. It must outlive the session. Not with a
   // scene, a tool with a shape or a lookahead, nor for an arm whose tool moves on a line or in a plane alone.
   Session& set_world(GeometricAlgorithm<3>& world);
   // In the place of the hand's motion and grip; of its file, its mass and, for the check of stability, its grip remain.
@@ -63,16 +62,16 @@ class Session {
 
   // Asks it to stop.
   void stop() noexcept;
-  // What its socket takes (docs/supervision.md), and the answer: "hold", "resume", "mass=3kg", "wall.friction=0.2",
-  // "status". Several changes at once have a tab between two. Throws SetupError where the session refuses, or none
-  // runs.
+  // Sends a line as to the session's socket (docs/supervision.md) and returns the answer: "hold", "resume", "mass=3kg",
+  // "wall.friction=0.2", "status". A tab separates changes that are made together. Throws SetupError if the session
+  // refuses, or if none runs.
   std::string ask(const std::string& line);
 
   // ---- any time
 
-  // What is possible but hardly meant, a sentence each: what `proxarm run` warns of.
+  // The warnings of `proxarm run`: values that are possible but hardly meant, a sentence each.
   [[nodiscard]] std::vector<std::string> surprises() const;
-  // Names of the objects that records have by their index.
+  // The names of the objects; records have their indices.
   [[nodiscard]] std::vector<std::string> objects() const;
   [[nodiscard]] const command_line::PreparedSession& prepared() const noexcept;
 

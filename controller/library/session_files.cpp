@@ -11,7 +11,8 @@ namespace proxarm::controller {
 
 namespace fs = std::filesystem;
 
-// Better now than after the run that it was to show. By its name nothing but an earlier plot can be overwritten.
+// Refuses a bad plot file before the run instead of after it. The file must end in .svg, so --plot can overwrite
+// nothing but a picture.
 void require_plot_file(const fs::path& file) {
   if (file.empty()) return;
   const auto refuse = [&](const char* expected) {
@@ -75,7 +76,7 @@ void SessionFiles::write_box(Summary& summary) const {
   summary.black_box = fs::absolute(folder).string();
 }
 
-// Without gnuplot a record has no plot; who has asked for one is told.
+// Without gnuplot a record has no plot. A plot that was asked for by --plot throws.
 void SessionFiles::draw(const Summary& summary) const {
   if (!plot_ || plot_->is_empty()) return;
   const fs::path file = options_.plot_file.empty() ? options_.record_dir / "plot.svg" : options_.plot_file;

@@ -1,5 +1,5 @@
-// What a session in a program of one's own leaves in files, as `proxarm run` does: the record, the plot, and the black
-// box after a fault. Each only where its option is given.
+// Writes the files of a session in your own program, as `proxarm run` does: record, plot, and the black box after a
+// fault; each only if its option is given.
 #pragma once
 
 #include <filesystem>
@@ -18,22 +18,22 @@
 
 namespace proxarm::controller {
 
-// Throws SetupError where a plot can't be written to the file that --plot names. Empty: none is named.
+// Throws SetupError if no plot can be written to `file`, which --plot names. Empty: no plot is named.
 void require_plot_file(const std::filesystem::path& file);
 
 class SessionFiles {
  public:
-  // Makes the record's folder; throws SetupError. A session with parts of one's own has no replay, which is made of
-  // files alone. The others must outlive this.
+  // Makes the record's folder; throws SetupError. A session with its own world, sensor or drives has no replay, which
+  // is computed from files alone. Precondition: session, options and box outlive this object.
   SessionFiles(const command_line::PreparedSession& session, const command_line::RunOptions& options,
                const BlackBox& box, Replay replay);
 
   [[nodiscard]] const SignalDeriver& deriver() const noexcept { return deriver_; }
   [[nodiscard]] bool keeps_frames() const noexcept { return writer_ != nullptr; }
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
-  // The record of the cycle that has just ended, with what the scene knows.
+  // Takes the completed record of the cycle that has just ended.
   void add(const CycleRecord& completed);
-  // Writes all; the summary gets the black box's folder. Throws SetupError.
+  // Writes all files and sets summary.black_box. Throws SetupError.
   void finish(Summary& summary);
 
  private:

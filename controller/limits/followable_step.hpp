@@ -1,9 +1,9 @@
-// The steps that the arm can follow, as a set of places around q₁ beside those of step_limits.hpp.
+// The steps that the arm can follow: a set of places around q₁, used beside the sets of step_limits.hpp.
 //
-// It has no closed form: it is the image of the joints' limits. It is therefore asked for, one half-space at a time:
-// whoever looks for the nearest point of all sets asks whether a point can be followed, and if it can't, takes in a
-// half-space that contains all steps that can (Kelley's cutting planes). The half-space touches the set where it is
-// nearest to that point, so one is usually enough.
+// The set is the image of the joints' limits and has no closed form. A solver that looks for the nearest point of all
+// sets therefore queries it: if the arm can't reach the found point, it adds a half-space that contains all reachable
+// steps (Kelley's cutting planes) and solves again. The half-space touches the set at the point nearest to the query,
+// so one cut is usually enough.
 #pragma once
 
 #include "controller/limits/step_limits.hpp"
@@ -18,10 +18,10 @@ class FollowableStep {
   FollowableStep& operator=(const FollowableStep&) = delete;
   virtual ~FollowableStep() = default;
 
-  // Whether the arm can go to q_W within this step, by its exact kinematics.
+  // Whether the arm can reach q_W within this step, by its exact kinematics.
   [[nodiscard]] virtual bool contains(const models::Vec3& q_W) noexcept = 0;
-  // If the arm can't go to q_W, by its kinematics linearised around this step: returns true and the half-space around
-  // q₁_W that contains all places it can go to, and not q_W. Its `limit` has the bits of all limits that form it.
+  // If the arm can't reach q_W, by its kinematics linearised around this step: returns true, and in `out` a half-space
+  // around q₁_W that contains all reachable places but not q_W. Its `limits` are those that form it.
   [[nodiscard]] virtual bool cut(const models::Vec3& q_W, const models::Vec3& q_k1_W, LimitPlane<3>& out) noexcept = 0;
 };
 

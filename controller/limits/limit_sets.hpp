@@ -2,12 +2,12 @@
 //
 //   min ½‖x − y‖²   over   n_i·x ≤ b_i,  ‖x − c_j‖ ≤ r_j
 //
-// The solution is determined by at most N of the sets, the active ones:
+// At most N of the sets, the active ones, determine the solution:
 //   y − x = Σ λ_i g_i,  λ_i ≥ 0,  g_i: outward unit normal of set i at x
-// They are found by an active-set method, in the way that linear programs of low dimension are solved (Sharir and Welzl
-// 1992). The set that the present point violates most joins the active ones. Of these at most N + 1 candidates, every
-// subset of at most N that includes the new one is tried (7 in space), and one of them is optimal for all candidates.
-// Each exchange increases the distance from y, so no active set occurs twice.
+// An active-set method finds them, as for linear programs of low dimension (Sharir and Welzl 1992). The set that the
+// present point violates most joins the active ones. Every subset of at most N of these candidates that includes the
+// new set is tried (7 in space); one of them is optimal for all candidates. Each exchange increases the distance from
+// y, so no active set occurs twice.
 //
 // All lengths in m. Nothing allocates, locks or throws.
 #pragma once
@@ -25,7 +25,7 @@
 
 namespace proxarm::controller {
 
-// The sets of one step in the N coordinates of a scene, and the projection onto them. x is q − q₁.
+// The sets of one step, and the projection onto them. x is q − q₁.
 template <int N>
 class LimitSets {
  public:
@@ -36,7 +36,7 @@ class LimitSets {
     arm_ = nullptr;
   }
 
-  // The intersection of sets in W with a scene's space (basis: 3×N, orthonormal).
+  // The intersection of the sets, given in W, with a scene's space (basis: 3×N, orthonormal).
   void set(const StepLimits& limits, const Eigen::Matrix<double, 3, N>& basis) noexcept {
     clear();
     for (std::size_t i = 0; i < limits.soft_count; ++i) soft_[soft_count_++] = cut(limits.soft[i], basis);
@@ -48,7 +48,7 @@ class LimitSets {
   }
 
   // Whether the arm can follow a step to x, by its exact kinematics. `scene_x`: the same point in the scene's
-  // coordinates; where these are W's own, the arm is asked for the very place that it will be sent to.
+  // coordinates. If these are W's, the query uses scene_x itself, the exact place that the arm is sent to.
   [[nodiscard]] bool followed(const V& x, const V& scene_x) const noexcept {
     if (arm_ == nullptr) return true;
     if constexpr (N == 3) {
@@ -57,7 +57,7 @@ class LimitSets {
     return arm_->contains(to_W(x));
   }
 
-  // Walls, which nearest() treats as half-spaces, too: −n·x ≤ −n·point, n out of the wall. At most `most_walls`.
+  // Walls are further half-spaces for nearest(): −n·x ≤ −n·point, n out of the wall. At most `most_walls`.
   static constexpr std::size_t most_walls = 6;
   void clear_walls() noexcept { flat_count_ = plane_count_; }
   void add_wall(const V& point, const V& normal) noexcept {
@@ -86,11 +86,11 @@ class LimitSets {
     std::array<V, N> basis;                // orthonormal; spans their normals at x
     std::size_t count = 0;                 // of members and basis
     double bend = 0.0;                     // Σ λ_j/r_j over the active balls
-    V shift = V::Zero();                   // −Σ λ_i g_i over the active limits, walls left out
-    bool exact = false;                    // false: the result of Dykstra's algorithm, without members
+    V shift = V::Zero();                   // −Σ λ_i g_i over the active limits, without walls
+    bool exact = false;                    // false: found by Dykstra's algorithm, no members
     ActiveLimits active;
 
-    // ∂x/∂y v = (E − Σ e eᵀ) v / (1 + Σ λ_j/r_j). This follows from y − x = Σ λ_i g_i with the active sets kept: along
+    // ∂x/∂y v = (E − Σ e eᵀ) v / (1 + Σ λ_j/r_j). This follows from y − x = Σ λ_i g_i with fixed active sets: along
     // their common surface, each ball's normal turns by 1/r_j per unit of length.
     [[nodiscard]] V derivative(const V& v) const noexcept {
       V along = v;
@@ -99,8 +99,8 @@ class LimitSets {
     }
   };
 
-  // The sets' point nearest to y. If no choice of active sets is found, because the sets have no point in common or
-  // nearly none, Dykstra's algorithm computes the point in at most `sweeps` sweeps; those made are subtracted.
+  // The sets' point nearest to y. If no active sets solve the problem, because the sets have almost no common point,
+  // Dykstra's algorithm computes the point. `sweeps`: its sweeps left; decreased by those made.
   [[nodiscard]] Nearest nearest(const V& y, bool with_soft, int& sweeps) noexcept {
     Nearest result;
     for (int cuts = 0;; ++cuts) {
@@ -114,11 +114,11 @@ class LimitSets {
     }
   }
 
-  // Moves x back into the sets along the straight line to the point that braking leads to (or to q₁, if that is in the
-  // sets). For an x that the alternation of contacts and limits, or Dykstra's algorithm, has left outside.
+  // Moves x back into the sets, towards the point that braking leads to (or q₁, if that is in the sets). For an x that
+  // the alternation of contacts and limits, or Dykstra's algorithm, left outside.
   [[nodiscard]] V draw_back(const V& x, bool with_soft) const noexcept {
     V base = V::Zero();
-    for (std::size_t i = 0; i < hard_count_; ++i) {  // the last ball, that of the acceleration, determines the point
+    for (std::size_t i = 0; i < hard_count_; ++i) {  // the last ball, of the acceleration, decides
       const double off = (base - hard_[i].centre).norm();
       if (off > hard_[i].radius_m) base = hard_[i].centre + hard_[i].radius_m / off * (base - hard_[i].centre);
     }
@@ -135,13 +135,13 @@ class LimitSets {
 
  private:
   static constexpr double sweep_tolerance_m = 1e-13;
-  static constexpr int most_exchanges = 60;  // of active sets; about 3 are usual
-  static constexpr double parallel = 1e-12;  // sine of the angle below which normals count as parallel
-  static constexpr int most_cuts = 8;        // in a search for the nearest point; one or two are usual
+  static constexpr int most_exchanges = 60;  // of active sets; usually about 3
+  static constexpr double parallel = 1e-12;  // normals count as parallel below this sine of their angle
+  static constexpr int most_cuts = 8;        // per call of nearest(); usually one or two
 
   [[nodiscard]] models::Vec3 to_W(const V& x) const noexcept { return q_k1_W_ + basis_ * x; }
 
-  // Takes in the half-space that separates x from what the arm can follow; false if it can follow x. Walls stay last.
+  // Adds the half-space that separates x from the followable steps; false if the arm can follow x. Walls stay last.
   bool take_in_cut(const V& x) noexcept {
     LimitPlane<3> plane;
     if (plane_count_ == StepLimits::max_planes || !arm_->cut(to_W(x), q_k1_W_, plane)) return false;
@@ -159,13 +159,13 @@ class LimitSets {
       if (plane_count_ == StepLimits::max_planes) break;
       const V normal = basis.transpose() * plane.normal;
       const double length = normal.norm();
-      if (!(length > 1e-9)) continue;  // parallel to the scene's space: no motion in it comes nearer
+      if (!(length > 1e-9)) continue;  // normal to the scene's space: motion in it comes no nearer
       planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limits};
     }
     flat_count_ = plane_count_;
   }
 
-  // Sets by number: planes, hard balls, soft balls.
+  // Sets by number: planes (limits, then walls), hard balls, soft balls.
   [[nodiscard]] std::size_t size(bool with_soft) const noexcept {
     return flat_count_ + hard_count_ + (with_soft ? soft_count_ : 0);
   }
@@ -174,7 +174,7 @@ class LimitSets {
   [[nodiscard]] const LimitBall<N>& ball(std::size_t i) const noexcept {
     return i < flat_count_ + hard_count_ ? hard_[i - flat_count_] : soft_[i - flat_count_ - hard_count_];
   }
-  // How far x is outside of set i; negative within.
+  // Distance of x outside set i; negative inside.
   [[nodiscard]] double violation(std::size_t i, const V& x) const noexcept {
     return is_ball(i) ? (x - ball(i).centre).norm() - ball(i).radius_m : planes_[i].normal.dot(x) - planes_[i].bound_m;
   }
@@ -198,13 +198,12 @@ class LimitSets {
       }
       const Nearest before = result;
       if (!exchange(y, before, worst, result)) return false;
-      if (!((result.x - y).squaredNorm() > (before.x - y).squaredNorm())) return false;  // no more than rounding
+      if (!((result.x - y).squaredNorm() > (before.x - y).squaredNorm())) return false;  // differs only by rounding
     }
     return false;
   }
 
-  // The point nearest to y of the sets that were active before and of `added`, which is active now. Small subsets are
-  // tried first.
+  // The point nearest to y of the formerly active sets and `added`, which is active now. Tries small subsets first.
   bool exchange(const V& y, const Nearest& before, std::size_t added, Nearest& result) const noexcept {
     for (std::size_t others = 0; others < N && others <= before.count; ++others) {
       for (unsigned choice = 0; choice < 1u << before.count; ++choice) {
@@ -225,10 +224,10 @@ class LimitSets {
     return false;
   }
 
-  // The point nearest to y on the borders of all of result.members. False if there is none, or if it isn't the nearest
-  // point of the sets themselves (some λ < 0).
+  // The point nearest to y on the borders of all of result.members. False if they have no common point, or if it isn't
+  // the nearest point of the sets themselves (some λ < 0).
   bool nearest_of_all(const V& y, Nearest& result) const noexcept {
-    // Two spheres meet in the plane of a circle: all balls but the first are replaced by such planes.
+    // Two spheres meet in a circle; the plane of that circle replaces all balls but the first.
     std::array<V, N> e;
     e.fill(V::Zero());
     std::array<double, N> offset{};
@@ -275,7 +274,7 @@ class LimitSets {
     return presses(y, outwards, result);
   }
 
-  // Gram-Schmidt: n·x = b less the part that the former equations e_k·x = offset_k imply. False if nothing is left.
+  // Gram-Schmidt: removes from n·x = b what the equations e_k·x = offset_k imply. False if n depends on them.
   static bool orthogonal(V& normal, double& bound, const std::array<V, N>& e, const std::array<double, N>& offset,
                          std::size_t count) noexcept {
     for (std::size_t k = 0; k < count; ++k) {
@@ -328,9 +327,8 @@ class LimitSets {
     }
   }
 
-  // The projection by Dykstra's algorithm of alternating projections (Boyle and Dykstra 1986). The hard balls come
-  // last, so that a result which hasn't converged satisfies at least those. `active`: the sets whose force isn't zero.
-  // `sweeps`: how many sweeps may still be made; those made are subtracted.
+  // Projection by Dykstra's alternating projections (Boyle and Dykstra 1986). The hard balls come last, so that even a
+  // result that hasn't converged satisfies them. `active`: the sets with a nonzero force. `sweeps` as in nearest().
   V project(V x, bool with_soft, ActiveLimits& active, int& sweeps) const noexcept {
     std::array<V, 2> soft{}, hard{};
     std::array<double, StepLimits::max_planes> pushed{};  // along the planes' normals, ≥ 0
@@ -381,7 +379,7 @@ class LimitSets {
   static void note(const LimitBall<N>& ball, const V& correction, ActiveLimits& active) noexcept {
     if (correction != V::Zero()) active.set(ball.limit);
   }
-  // A ball's intersection with the scene's line or plane through q₁; a point if the ball doesn't reach it.
+  // A ball's intersection with the scene's line or plane through q₁; a point if they don't meet.
   static LimitBall<N> cut(const LimitBall<3>& ball, const Eigen::Matrix<double, 3, N>& basis) noexcept {
     const V centre = basis.transpose() * ball.centre;
     const double off2 = (ball.centre - basis * centre).squaredNorm();

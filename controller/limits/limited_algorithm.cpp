@@ -45,7 +45,7 @@ auto LimitedAlgorithm<N>::solve(double K, const V& p, const V& q, const V& free)
     now = at(step, now.shift - now.gap);
     const double gap = now.gap.norm();
     if (gap <= tolerance_m) return take(now);
-    // The gap has stopped shrinking: contacts and limits have no point in common.
+    // The gap no longer shrinks: contacts and limits have no common point.
     stuck = std::abs(gap - gap_before) <= 1e-3 * gap ? stuck + 1 : 0;
     if (stuck >= 3 || (!now.l.exact && step.sweeps <= 0)) break;
     gap_before = gap;
@@ -93,7 +93,7 @@ bool LimitedAlgorithm<N>::jump(Step& step, Try& now) noexcept {
     }
     V ds = J.fullPivLu().solve(-now.gap);
     if (!ds.allFinite()) return false;
-    // The step is bounded by the size of the present forces, since J is nearly singular where 𝒢 sticks or jams.
+    // The present forces bound the step, since J is nearly singular when 𝒢 sticks or jams.
     const double most = (now.r - step.p).norm(), length = ds.norm();
     if (length > most) ds *= most / length;
     now = at(step, now.shift + ds);

@@ -11,8 +11,7 @@ using models::Vec3;
 
 namespace {
 
-// The share of the tool's speed limit that is commanded. Elastic gears add some 7 % when the hand pulls the arm along
-// at the limit.
+// Commanded share of the tool's speed limit. Elastic gears add some 7 % when the hand pulls the arm along at the limit.
 constexpr double commanded_share = 0.9;
 
 void add_plane(StepLimits& out, const LimitPlane<3>& plane) noexcept {
@@ -97,7 +96,7 @@ void StepLimiter::add_balls(const StepStart& start, StepLimits& out) const noexc
 void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out) const noexcept {
   const double T = period_s_;
   const double share = T / (T + limits_.max_tool_speed_m_per_s / limits_.max_tool_acceleration_m_per_s2);
-  // A point that is already outside may not go further out.
+  // A point outside may not go further out.
   const auto room = [&](double d, double setback) {
     return borders == Borders::walls ? d : std::max(0.0, share * (d - setback));
   };

@@ -14,36 +14,36 @@ using models::Vec3;
 
 namespace {
 
-// Each step keeps the proxy within the leash's set, to 1e-9 m or better; this margin is well above that.
+// Each step keeps the proxy within the leash to 1e-9 m or better; this margin is well above that.
 constexpr double leash_tolerance_m = 1e-6;
-// The tool's speed limit changes by at most this deceleration or acceleration, and by at most a quarter of the
-// acceleration that the cell allows. The sets of speed and of acceleration therefore always have points in common.
+// Highest rate of change of the tool's speed limit, also bounded to a quarter of the cell's acceleration limit, so that
+// the sets of speed and acceleration always intersect.
 constexpr double speed_limit_m_per_s2 = 1.0;
-// If nothing was touched, the hand's force shows the direction to back off in; it must exceed this.
+// If nothing was touched, the hand's force gives the direction to back off, if it exceeds this.
 constexpr double pinning_force_N = 5.0;
-// A torque that turns the tool counts as the force that makes it at this lever, the length of a handle.
+// A torque that turns the tool counts as the force that makes it at this lever, a handle's length.
 constexpr double torque_lever_m = 0.1;
-// By how much an orientation that is held may lag where joints have not enough left to turn the tool: at a wrist's
-// singularity. Half of what a person sees of a handle.
+// Allowed lag of a held orientation when the joints can't turn the tool fast enough, near a wrist singularity. Half of
+// what a person notices in a handle.
 constexpr double held_lag_rad = 0.1;
-// A place that the arm was sent to is the proxy's to this: the kinematics' own tolerance, and rounding.
+// Places closer than this are equal: tolerance of the kinematics, plus rounding.
 constexpr double same_place_m = 2e-12;
-// A lag in turning below this is the kinematics' own tolerance.
+// Turning lags below this are within the tolerance of the kinematics.
 constexpr double same_turn_rad = 1e-9;
 
 Eigen::Quaterniond orientation_of(const models::Pose& X_WT) noexcept {
   return Eigen::Quaterniond(X_WT.linear()).normalized();
 }
 
-// An arm that can't follow a motion gives no energy to it: joints that turn the tool faster than its proxy for a moment
-// would make it swing by itself.
+// Limits the turning speed that the proxy takes over from the arm. Joints that turn the tool faster than its proxy for
+// a moment would add energy, and the arm would swing by itself.
 Vec3 no_faster(const Vec3& omega_W, double most) noexcept {
   const double speed = omega_W.norm();
   return speed > most ? Vec3(most / speed * omega_W) : omega_W;
 }
 
-// From the proxy to the steel, but for two periods and what is looked ahead: the setpoints' filter and the slowest
-// drive.
+// Delay of setpoint filter and slowest drive. The delay from the proxy to the real arm is this plus two periods less
+// the lookahead.
 double drives_lag_s(const std::vector<description::DriveDescription>& drives,
                     const description::CellLimits& limits) noexcept {
   const double filter_s =
@@ -85,8 +85,8 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
       arm_step_(arm, parts_.inverse, drives, settings.period_s),
       final_(arm, drives, limits, settings.period_s) {
   state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;
-  // The longest time in which the tool comes to rest: joints brake, the tool's acceleration is limited, and setpoints
-  // come late by the filter.
+  // Longest time in which the tool comes to rest: the joints brake, the tool's acceleration is limited, and the filter
+  // delays setpoints.
   limits_work_.set_braking(
       parts_.elastic.filter().lead_s() +
       std::max(ArmStep::braking_s(drives), limits.max_tool_speed_m_per_s / limits.max_tool_acceleration_m_per_s2));
@@ -112,7 +112,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
 
 // ---- beginnings and ends
 
-// The first setpoint equals the last one.
+// The first setpoint equals the last one before.
 void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noexcept {
   const JointVector target_rad = final_.target_rad();
   state_.freeing = beginning == Beginning::freeing;
@@ -170,7 +170,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   ahead_->proxy_filter.set_period(period_s);
 }
 
-// With another mass, damping or spring the prediction yields another point, to which the arm moves slowly.
+// Another mass, damping or spring changes the predicted point; the arm moves there slowly.
 void AdmittanceMotion::set(const Change& change) noexcept {
   parts_.tool->set(change);
   if (!ahead_) return;
@@ -241,7 +241,8 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   state_.mass_kg = step.mass_kg;
   state_.damping_Ns_per_m = step.damping_Ns_per_m;
   state_.touches = step.contacts > 0;
-  state_.limited = step.limits.has(Limit::speed) && !state_.freeing;  // freed, the tool is slow by intent
+  state_.limited = step.limits.has(Limit::speed) && !state_.freeing;  // while it is being freed, the tool is slow on
+                                                                      // purpose
   if (step.settled) state_.q_k2_W = state_.q_k1_W;
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.touches[0].normal_W;
@@ -259,7 +260,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   return true;
 }
 
-// The proxy has stepped. False if it couldn't.
+// Takes over the proxy's step; false if it failed.
 bool AdmittanceMotion::take(const WorldStep& step, const MotionCycle& cycle) noexcept {
   if (step.fault != ProxyFault::none) {
     cycle.alarm.raise(step.fault == ProxyFault::squeezed ? Fault::proxy_squeezed : Fault::proxy_not_finite);
@@ -271,15 +272,15 @@ bool AdmittanceMotion::take(const WorldStep& step, const MotionCycle& cycle) noe
   return true;
 }
 
-// How far the end of a handle is from where the proxy would have it, by what the arm lags in turning.
+// Lag in turning as a distance at the end of a handle, in m.
 double AdmittanceMotion::turned_away_m(const Measured& measured) const noexcept {
   if (!parts_.tool->turns()) return 0.0;
   const Eigen::Quaterniond R_WT(models::Mat3(measured.R_WS * R_TS_.transpose()));
   return torque_lever_m * R_WT.angularDistance(parts_.tool->R_WT());
 }
 
-// Makes the sets of this step: around the proxy, and with lookahead around the point that the arm is sent to, too.
-// There, the arm's acceleration limits the point, and the proxy's acceleration is limited against a filter of its own.
+// Makes the sets of this step around the proxy. With lookahead, also those around the commanded point: the arm's
+// acceleration then limits that point, and a separate filter state limits the proxy's acceleration.
 void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
   const LinkFilter& filter = parts_.elastic.filter();
   const models::ToolKinematics& filtered = parts_.elastic.kinematics();
@@ -319,7 +320,8 @@ ArmStepStart AdmittanceMotion::arm_start(const LinkFilter& filter, const JointVe
   return start;
 }
 
-// Moves the tool's speed limit towards the one wanted in this cycle. While the tool stands, a lower one holds at once.
+// Moves the tool's speed limit towards the one wanted in this cycle. While the tool stands, a lower limit applies at
+// once.
 void AdmittanceMotion::limit_speed(const MotionCycle& cycle) noexcept {
   const double most = limits_.max_tool_speed_m_per_s;
   double wanted = cycle.slowed ? std::min(supervision_.slow_speed_m_per_s, most) : most;
@@ -340,7 +342,7 @@ void AdmittanceMotion::count_work(const WorldStep& step) noexcept {
   work_.guarded = final_.judged_exactly();
 }
 
-// ρ² of what is felt, with the tool behind the sensor; 0 before the first step.
+// ρ² of the felt inertia and mass, tool behind the sensor included; 0 before the first step.
 double AdmittanceMotion::gyration_m2() const noexcept {
   return state_.mass_kg > 0.0 ? parts_.tool->inertia_kg_m2() / (state_.mass_kg + tool_mass_kg_) : 0.0;
 }
@@ -384,14 +386,14 @@ void AdmittanceMotion::record_passivity(const WorldStep& step, CycleRecord& reco
 
 // ---- getting free
 
-// The part of a force that can move the tool. In an arm with few axes, which moves in a plane or along a line, the
-// structure carries the rest.
+// The part of a force that can move the tool. In an arm of few axes, which moves in a plane or line, the structure
+// carries the rest.
 Vec3 AdmittanceMotion::moving_force_W(const Vec3& force_W) const noexcept {
   const models::ToolSpace& space = parts_.inverse.space();
   return space.dimensions == 3 ? force_W : Vec3(space.projection() * force_W);
 }
 
-// The tool backs off from the object touched last, or in the direction of the hand's push if nothing was touched.
+// The tool backs off from the last touched object, or along the hand's push if nothing was touched.
 bool AdmittanceMotion::prepare_freeing(const Command& command, const Measured& measured) noexcept {
   if (command.order == Order::release) {
     parts_.release->start_release();
@@ -429,10 +431,9 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
 
 // ---- from the proxy to the setpoints
 
-// The arm is sent to the point where the proxy would be after the horizon H if it coasted. If the hand's force h were
-// held meanwhile, the proxy would be ½H²h/M further. That term is left out, because the sensor at the handle also
-// measures the inertia of the hand's own mass, which the term would feed back: the arm's elastic modes would then stay
-// calm only up to half as long a horizon (docs/design.md has the figures).
+// The arm is sent to the proxy's place after the horizon H if it coasts. With a constant hand force h the proxy would
+// be ½H²h/M further. This term is left out, because the sensor also measures the inertia of the hand's own mass: fed
+// back, it would halve the horizon at which the arm's elastic modes stay calm (figures in docs/design.md).
 bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   if (tool().turns()) {
     cycle.record.proxy_inertia_kg_m2 = parts_.tool->inertia_kg_m2();
@@ -460,7 +461,7 @@ bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   return true;
 }
 
-// f_l is what the limits did in the proxy's step, and what the arm's step moved the proxy by beside it.
+// f_l: the limits' force in the proxy's step, plus the force for the displacement by the arm's step.
 void AdmittanceMotion::judge_limits(const WorldStep& step, const Vec3& from_W, const MotionCycle& cycle) noexcept {
   if (step.settled) return;
   const double T = period_s_, kappa = step.mass_kg / (T * T) + step.damping_Ns_per_m / T;
@@ -477,7 +478,7 @@ void AdmittanceMotion::judge_limits(const WorldStep& step, const Vec3& from_W, c
   cycle.alarm.raise(Fault::works_against_hand, -1, limits_work_.push_J(), limits_work_.allowed_J());
 }
 
-// Takes a step of the arm to q_W, turned as the proxy is. False if that isn't a pose.
+// Moves the arm to q_W with the proxy's orientation. False if the pose is invalid.
 bool AdmittanceMotion::go(ArmStep& step, const Vec3& q_W, const MotionCycle& cycle) noexcept {
   if (step.go(q_W, tool().R_WT()) == ArmStep::Outcome::invalid) {
     cycle.alarm.raise(Fault::singular);
@@ -487,31 +488,30 @@ bool AdmittanceMotion::go(ArmStep& step, const Vec3& q_W, const MotionCycle& cyc
   return true;
 }
 
-// Puts the proxy to where this step has led, if that isn't where the proxy stepped to.
+// Moves the proxy to the arm's place if they differ.
 void AdmittanceMotion::put_proxy_where(const ArmStep& step) noexcept {
   const Vec3& q_W = step.kinematics().X_WT.translation();
   if ((q_W - state_.q_k1_W).norm() > same_place_m) put_proxy_to(q_W, (q_W - state_.q_k2_W) / period_s_);
 }
 
-// The proxy is at q_W instead of where it stepped to, with this velocity.
 void AdmittanceMotion::put_proxy_to(const Vec3& q_W, const Vec3& velocity_W) noexcept {
   state_.q_k1_W = tool().resume(q_W, velocity_W);
 }
 
-// How fast the tool turns on where the arm couldn't follow: as fast as the proxy did, or, where that was slow, up to a
-// quarter of the limit, since joints can't stop at once either.
+// Highest turning speed after the arm couldn't follow: the proxy's, but at least a quarter of the limit, since joints
+// can't stop at once.
 double AdmittanceMotion::most_turning_rad_per_s() const noexcept {
   return std::max(tool().omega_W().norm(), 0.25 * limits_.max_turning_speed_rad_per_s);
 }
 
-// The tool turns on from the orientation that the arm has reached.
+// The proxy continues from the orientation that the arm has reached.
 void AdmittanceMotion::turn_on_from(const ArmStep& step, const Eigen::Quaterniond& from) noexcept {
   const Vec3 turn = models::rotation_vector(step.R_WT() * from.conjugate());
   const Vec3 omega_W = no_faster(turn / period_s_, most_turning_rad_per_s());
   state_.q_k1_W = tool().turn_on(step.R_WT(), omega_W, state_.q_k1_W, (state_.q_k1_W - state_.q_k2_W) / period_s_);
 }
 
-// The limits of turning that setpoints are judged by. While the tool is slowed they stay as they are.
+// Limits of turning for judging setpoints. Slowing the tool doesn't lower them.
 TurnSets AdmittanceMotion::turn_limits() const noexcept {
   TurnSets sets = tool().sets().sent();
   sets.max_speed_rad_per_s = std::max(sets.max_speed_rad_per_s, limits_.max_turning_speed_rad_per_s);
@@ -536,8 +536,8 @@ void AdmittanceMotion::send(const Measured& measured) noexcept {
   if (result.differs) go_on_from_setpoints(result.blocked);
 }
 
-// Filter, arm and proxy go on from what was commanded. The setpoint of a blocked joint may have moved fast; that joint
-// goes on at rest.
+// Filter, arm and proxy continue from the commanded setpoints. The setpoint of a blocked joint may have moved fast;
+// that joint continues at rest.
 void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   const JointVector speed = final_.go_on_from_here(blocked);
   parts_.elastic.resume(final_.target_rad(), speed);
@@ -551,8 +551,8 @@ void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   if (ahead_) {
     ahead_->proxy_step.resume(arm_step_.link_rad() - ahead_s() * speed, period_s_ * speed);
     ahead_->proxy_filter.resume(filter.rad() - ahead_s() * speed, speed);
-    // Joints that go on at their speeds lead the tool along a curve. A proxy that isn't where its own step is would be
-    // moved there in the next cycle.
+    // With constant joint speeds the tool moves along a curve. If the proxy weren't at the place of its arm step,
+    // the next cycle would move it there.
     const Vec3 c_W = q_W;
     q_W = ahead_->proxy_step.kinematics().X_WT.translation();
     ahead_->point.resume(c_W, q_W, velocity_W);

@@ -1,17 +1,16 @@
-// Motion of the admittance type: the hand's force moves a proxy, and the arm's motors follow it.
+// Motion of the admittance type: the hand's force moves a proxy, and the arm follows the proxy.
 //
 //   hand's wrench ─▶ proxy (26) in the scene, within what the arm can follow ─▶ step of the arm ─▶ elastic gears ─▶
 //   (hand_judge.hpp)  (rendering/)            (arm_step/)                       (arm_step.hpp)   (elastic_setpoint.hpp)
 //   ─▶ final setpoints
 //   (final_setpoints.hpp)
 //
-// The proxy's next place is one that the arm can go to, so the proxy is always where the arm is being sent. With
-// lookahead, the arm is sent to a predicted position of the proxy (sent_point.hpp), and the proxy keeps to what an arm
-// could follow that was sent to the proxy itself: there are two steps of the arm then. Records and reports tell of the
-// proxy.
+// The limits of a step contain only places that the arm can reach, so the arm is sent to the proxy itself. With
+// lookahead it is sent to the proxy's predicted position (sent_point.hpp). A second arm step then keeps the proxy where
+// an arm sent to it could follow. Records and reports describe the proxy.
 //
-// Where a drive doesn't follow, or a guard has held a setpoint back, the motion goes on from what was commanded
-// (go_on_from_setpoints()): nothing is caught up later.
+// If a drive doesn't follow or a guard holds a setpoint back, the motion continues from the commanded setpoints
+// (go_on_from_setpoints()) and doesn't catch up later.
 #pragma once
 
 #include <cstdint>
@@ -72,18 +71,18 @@ class AdmittanceMotion final : public Motion {
   void archive(fieldbus::StateArchive& state) noexcept override;
 
  private:
-  // What lasts from cycle to cycle. The histories of proxy, arm, filter and setpoints are in their own objects.
+  // State from cycle to cycle. Proxy, arm step, filter and setpoints keep their own histories.
   struct State {
-    models::Vec3 q_k1_W = models::Vec3::Zero();         // the proxy of the last cycle
-    models::Vec3 q_k2_W = models::Vec3::Zero();         // and of the one before
-    double speed_limit_m_per_s = 0.0;                   // the tool's present speed limit
-    models::Vec3 last_normal_W = models::Vec3::Zero();  // the normal of the last contact; zero: there was none
-    double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // those of the proxy's last step
+    models::Vec3 q_k1_W = models::Vec3::Zero();         // proxy of the last cycle
+    models::Vec3 q_k2_W = models::Vec3::Zero();         // proxy of the cycle before
+    double speed_limit_m_per_s = 0.0;                   // present speed limit of the tool
+    models::Vec3 last_normal_W = models::Vec3::Zero();  // normal of the last contact; zero: none yet
+    double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // of the proxy's last step
     bool touches = false;                               // the proxy's last step ended in contact
-    bool limited = false;                               // a limit acted in it
-    bool freeing = false;                               // the tool is being freed: it moves without the scene
+    bool limited = false;                               // the tool's speed limit acted in that step
+    bool freeing = false;                               // release, back-off or yield: the tool moves without the scene
   };
-  // With lookahead: the point that the arm is sent to, and the arm as if it were sent to the proxy.
+  // With lookahead: the commanded point, and an arm step as if the arm were sent to the proxy.
   struct Ahead {
     SentPoint point;
     ArmStep proxy_step;
@@ -91,7 +90,7 @@ class AdmittanceMotion final : public Motion {
     StepLimits limits;  // around the point
   };
 
-  // A tool that is freed is a point, without the scene.
+  // While the tool is being freed, it is a point without a scene.
   [[nodiscard]] RenderedTool& tool() const noexcept {
     if (state_.freeing) return parts_.release->tool();
     return *parts_.tool;
@@ -113,7 +112,7 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] double most_turning_rad_per_s() const noexcept;
   [[nodiscard]] double turned_away_m(const Measured& measured) const noexcept;
   [[nodiscard]] models::Vec3 moving_force_W(const models::Vec3& force_W) const noexcept;
-  // The horizon that is looked ahead; zero while the arm is freed, since nobody feels a mass then.
+  // The present lookahead; 0 while the tool is being freed, since nobody feels a mass then.
   [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : ahead_->point.horizon_s(); }
   void count_work(const WorldStep& step) noexcept;
   void observe_hand(const Measured& measured) noexcept;
@@ -126,17 +125,17 @@ class AdmittanceMotion final : public Motion {
   description::CellLimits limits_;
   description::SupervisionDescription supervision_;
   double period_s_, tool_mass_kg_;
-  double drives_lag_s_, horizon_s_;             // of the hand's judge: from the proxy to the steel
-  models::Mat3 R_TS_;                           // of the sensor in the tool
-  std::optional<PassivityObserver> passivity_;  // nullopt: not wanted
+  double drives_lag_s_, horizon_s_;             // for the hand judge: delay of filter and drives, lookahead
+  models::Mat3 R_TS_;                           // orientation of the sensor in the tool
+  std::optional<PassivityObserver> passivity_;  // nullopt: switched off
   HandJudge hand_;
   StepLimiter limiter_;
-  ArmStep arm_step_;  // of the arm as it is sent
+  ArmStep arm_step_;  // for the angles that are commanded
   std::unique_ptr<Ahead> ahead_;
-  std::optional<GearDamping> gear_damping_;  // none: no gear's torque is measured, or none is to be damped
+  std::optional<GearDamping> gear_damping_;  // nullopt: no gear torque is measured, or damping is off
   FinalSetpoints final_;
   LimitsWork limits_work_;
-  StepLimits step_limits_;  // of this cycle, around the proxy
+  StepLimits step_limits_;  // this cycle's, around the proxy
   State state_;
   MotionWork work_;
 };

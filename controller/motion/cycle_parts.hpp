@@ -1,4 +1,4 @@
-// All that a cycle works on; it is built and configured before the first one (session/bring_up.hpp).
+// All objects that a cycle works on, built and configured before the first one (session/bring_up.hpp).
 #pragma once
 
 #include <array>
@@ -27,7 +27,6 @@
 
 namespace proxarm::controller {
 
-// The drive of an axis, on CAN or on a Modbus line.
 struct DriveOnBus {
   static constexpr std::size_t no_bus = static_cast<std::size_t>(-1);
 
@@ -36,8 +35,8 @@ struct DriveOnBus {
   std::size_t bus;               // index in the network; no_bus: on a Modbus line
 };
 
-// The first drive that takes no setpoints yet although its time for that is over (`enable_timeout_s` of the cell's
-// drive, or `usual_s`); drive −1: none. `following`: a bit for each drive that does.
+// The first drive that takes no setpoints after its time limit (enable_timeout_s of the cell's drive, or usual_s);
+// drive −1: none. `following`: bits of the drives that take setpoints.
 struct OverdueDrive {
   int drive = -1;
   double limit_s = 0.0;
@@ -52,34 +51,34 @@ struct DriveBus {
   fieldbus::HeartbeatProducer heartbeat;
 };
 
-// The admittance type: what lies between the hand's force and the setpoints.
+// Admittance type: everything between the hand's force and the setpoints.
 struct AdmittanceParts {
   models::InverseKinematics inverse;
   ElasticSetpoint elastic;
   std::unique_ptr<RenderedTool> tool;
-  std::optional<LinkMotion> links;  // of a tool that turns, for its passivity observer
+  std::optional<LinkMotion> links;  // for the passivity observer of a tool that turns
   std::unique_ptr<Release> release;
 };
 
-// All parts of a cycle. Drives stand in the order of the arm's joints.
+// All parts of a cycle. Drives are in the order of the arm's joints.
 struct CycleParts {
   fieldbus::CanNetwork& network;
   std::vector<DriveOnBus> drives;
-  std::vector<fieldbus::DriveSlot> can_drives;  // those drives that are on CAN; all of them if they take torques
+  std::vector<fieldbus::DriveSlot> can_drives;  // the drives on CAN; all drives if they take torques
   std::vector<DriveBus> drive_buses;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
   std::size_t sensor_bus;  // DriveOnBus::no_bus: on a Modbus line
   std::vector<std::unique_ptr<fieldbus::ModbusLine>>
-      modbus_lines;                  // declared after drives and sensor: its workers end first
-  std::unique_ptr<models::Arm> arm;  // on the heap, since others keep references to it
-  std::variant<AdmittanceParts, std::unique_ptr<TorqueRendering>> rendering;  // its alternative is the session's type
+      modbus_lines;                  // declared after drives and sensor, so that its threads end first
+  std::unique_ptr<models::Arm> arm;  // on the heap: others keep references to it
+  std::variant<AdmittanceParts, std::unique_ptr<TorqueRendering>> rendering;  // the alternative is the session's type
   WrenchCompensation compensation;
   description::ToolDescription tool;  // behind the sensor
   std::optional<EnablingInput> enabling;
   description::SupervisionDescription supervision;
 };
 
-// The largest step of each joint in one cycle, at its drive's highest speed.
+// Largest step of each joint in a cycle, at its drive's maximum speed.
 std::array<double, models::max_axes> max_steps_rad(const std::vector<description::DriveDescription>& drives,
                                                    double period_s) noexcept;
 

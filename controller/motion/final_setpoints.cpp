@@ -46,7 +46,7 @@ FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const 
   return result;
 }
 
-// That of the joint which holds the tool furthest back, as if it were the one with the longest lever.
+// Lag of the joint that holds the tool back most, converted to the joint with the longest lever.
 double FinalSetpoints::lag_rad() const noexcept { return guard_.lag_rad().cwiseAbs().cwiseProduct(lever_).maxCoeff(); }
 
 JointVector FinalSetpoints::go_on_from_here(std::uint8_t blocked) noexcept {
@@ -54,7 +54,7 @@ JointVector FinalSetpoints::go_on_from_here(std::uint8_t blocked) noexcept {
   return guard_.speed_rad_per_s();
 }
 
-// Without bounds: braking, which was judged before.
+// Without bounds: for braking, which was judged before.
 ActiveLimits FinalSetpoints::guard(const JointVector& wanted_rad, const Bounds* bounds, bool& held_back) noexcept {
   ActiveLimits active = guard_.step(wanted_rad);
   const ActiveLimits by_tool =
@@ -68,7 +68,7 @@ ActiveLimits FinalSetpoints::guard(const JointVector& wanted_rad, const Bounds* 
   return active;
 }
 
-// The time is the longest that any joint needs at its own deceleration.
+// The braking time is the longest that any joint needs at its own deceleration.
 void FinalSetpoints::start_run_out() noexcept {
   double stop_s = period_s_;
   for (Eigen::Index i = 0; i < guard_.speed_rad_per_s().size(); ++i) {
@@ -85,19 +85,18 @@ ActiveLimits FinalSetpoints::run_out() noexcept {
   return guard(guard_.target_rad() + state_.run_out_share * period_s_ * state_.run_out_rad_per_s, nullptr, held_back);
 }
 
-// Returns the joints whose drives are blocked, as bits. A blocked drive is commanded at most a little ahead of its
-// reported position, and all other joints wait. The gears are thus wound up so little that nothing snaps when the drive
-// comes free. The room around the report grows with speed, because a drive that follows its setpoint reports it with a
-// lag: the setpoint on its way to the drive, and the answer on its way back.
+// Returns the joints whose drives are blocked, as bits. The setpoint of a blocked drive stays close to its reported
+// position, and all other joints wait. So gears wind up little, and nothing snaps when the drive comes free. The
+// allowed distance grows with speed: a drive that follows reports its setpoint late, by the way there and back.
 //
-// A false report must not lead the setpoint anywhere. Let θ be the report, r the room around it, w the wanted setpoint
-// and [l, h] the envelope of the setpoints sent before the joint was blocked (setpoint_envelope.hpp). The command is
+// A false report must not move the setpoint. Let θ be the report, r the allowed distance, w the wanted setpoint and [l,
+// h] the envelope of the setpoints sent before the joint was blocked (setpoint_envelope.hpp). The command is
 //     c = clamp(clamp(w, θ − r, θ + r), min(l, w), max(h, w))
-// If the joint has jammed, θ is between l and h, so c = θ ± r: the setpoint brakes and comes back to the joint. If θ is
-// outside, the encoder or the drive reports a false position, and c is w or a place to which the joint was sent before.
-// If nobody is at the handle, proxy and filter go on from the last setpoint, which is therefore w; so l = h = w = c
-// stays constant, whatever θ does. If somebody is, c goes no further than w, which the hand has made. No sequence of
-// reports therefore moves the arm by more than it has moved within the lag, and without a hand none moves it at all.
+// If the joint has jammed, θ is between l and h, so c = θ ± r: the setpoint brakes and returns to the joint. If θ is
+// outside, the report is false, and c is w or a place to which the joint was sent before. With nobody at the handle,
+// proxy and filter continue from the last setpoint, so l = h = w = c stays constant for any θ. With a hand, c goes no
+// further than w, which the hand has made. So no sequence of reports moves the arm by more than it moved within the
+// lag, and without a hand not at all.
 std::uint8_t FinalSetpoints::find_blocked(const JointVector& motor_rad, const Measured& measured,
                                           JointVector& wanted_rad) const noexcept {
   std::uint8_t blocked = 0;
@@ -120,7 +119,7 @@ std::uint8_t FinalSetpoints::find_blocked(const JointVector& motor_rad, const Me
   return blocked;
 }
 
-// The envelope of a blocked joint isn't updated.
+// Updates the envelopes of the joints that aren't blocked.
 void FinalSetpoints::follow(const Measured& measured, std::uint8_t blocked) noexcept {
   for (Eigen::Index i = 0; i < measured.axes(); ++i) {
     if ((blocked & 1u << i) != 0) continue;

@@ -1,5 +1,5 @@
-// The one place where setpoints become final, in every phase: what drives that don't follow allow, then each joint's
-// own limits (joint_guard.hpp), then those of tool and elbow (tool_guard.hpp). Neither allocates, locks nor throws.
+// The one place where setpoints become final, in all phases: first drives that don't follow, then the joints' limits
+// (joint_guard.hpp), then those of tool and elbow (tool_guard.hpp). Neither allocates, locks nor throws.
 #pragma once
 
 #include <array>
@@ -25,50 +25,47 @@ class FinalSetpoints {
                  const description::CellLimits& limits, double period_s);
 
   void set_period(double period_s) noexcept;
-  // At rest at these angles of the motors.
+  // Starts at rest at these motor angles.
   void start(const models::JointVector& target_rad) noexcept;
 
   struct Result {
-    ActiveLimits limits;       // that held something back
+    ActiveLimits limits;       // limits that held a setpoint back
     std::uint8_t blocked = 0;  // joints whose drives don't follow, as bits
-    bool guarded = false;      // the tool's guard, which is the last one, held something back
-    // What was wanted can't be caught up: the motion has to go on from what was commanded. A guard that holds back a
-    // little is caught up with, as joints that lag are: going on from setpoints takes the motors' lead for the links'
-    // place, and would shake the tool. A little: what moves the tool no further than limits.following_error_rad of the
-    // joint that moves it furthest.
+    bool guarded = false;      // the tool guard held a setpoint back
+    // The wanted setpoints can't be caught up; the motion must continue from the commanded ones. A small lag is caught
+    // up instead: to continue from setpoints takes the motors' angles for the links' and would shake the tool. A lag is
+    // small if it moves the tool no further than limits.following_error_rad of the joint with the longest lever.
     bool differs = false;
   };
-  // Bounds on the setpoints of one period.
   struct Bounds {
     double max_speed_m_per_s;  // the tool's present speed limit
-    models::Vec3 links_W;      // where the motors lead the links' tool
-    const TurnSets* turn;      // limits of turning; null: they aren't judged
+    models::Vec3 links_W;      // the tool's place by the links, which the motors lead
+    const TurnSets* turn;      // limits of turning; null: not judged
   };
-  // One period towards these angles of the motors.
+  // One period towards these motor angles.
   Result step(const models::JointVector& motor_rad, const Measured& measured, const Bounds& bounds) noexcept;
-  // After a step that differs: what is wanted next counts from here. Returns the motors' speeds, rad/s.
+  // Call after a step that differs: the next wanted setpoints count from here. Returns the motor speeds, rad/s.
   models::JointVector go_on_from_here(std::uint8_t blocked) noexcept;
 
-  // Begins to bring the joints to rest: every joint decelerates from its last speed in the same time.
+  // Begins to brake all joints to rest: each decelerates from its last speed, all in the same time.
   void start_run_out() noexcept;
   ActiveLimits run_out() noexcept;
   [[nodiscard]] bool has_run_out() const noexcept { return state_.run_out_share <= 0.0 && guard_.at_rest(); }
 
-  // The largest step of each joint in one cycle, at its drive's highest speed.
   [[nodiscard]] std::array<double, models::max_axes> max_steps_rad(double period_s) const noexcept {
     return controller::max_steps_rad(drives_, period_s);
   }
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return guard_.target_rad(); }
   [[nodiscard]] bool at_rest() const noexcept { return guard_.at_rest(); }
-  // How many setpoints the tool's guard has judged exactly, since they were near a bound.
+  // Number of setpoints near a bound, judged exactly by the tool guard.
   [[nodiscard]] std::uint64_t judged_exactly() const noexcept { return tool_guard_.judged_exactly(); }
   void archive(fieldbus::StateArchive& state) noexcept;
 
  private:
   struct State {
     models::JointVector run_out_rad_per_s;  // each joint's speed when the run-out began
-    double run_out_share = 1.0;             // the share of that speed that is left
-    double run_out_per_cycle = 1.0;         // by which the share shrinks in each cycle
+    double run_out_share = 1.0;             // remaining share of that speed
+    double run_out_per_cycle = 1.0;         // decrease of the share per cycle
   };
 
   ActiveLimits guard(const models::JointVector& wanted_rad, const Bounds* bounds, bool& held_back) noexcept;
@@ -82,8 +79,8 @@ class FinalSetpoints {
   double period_s_;
   JointGuard guard_;
   ToolGuard tool_guard_;
-  models::JointVector lever_;  // of each joint: how far it moves the tool at most, as a share of the longest
-  SetpointEnvelope envelope_;  // of the setpoints; a blocked joint's is frozen
+  models::JointVector lever_;  // of each joint: largest distance of the tool from its axis, relative to the longest
+  SetpointEnvelope envelope_;  // of the setpoints; frozen for blocked joints
   State state_;
 };
 

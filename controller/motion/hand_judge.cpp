@@ -68,7 +68,7 @@ models::Wrench HandJudge::step(const MotionCycle& cycle, const ProxyMotion& prox
   return {empty_->braking_force_W(proxy.mass_kg, proxy.v_W), proxy.braking_torque_W};
 }
 
-// Raises the share that is let in linearly from 0 to 1 over ramp_in_s.
+// Raises the wrench's share linearly from 0 to 1 over ramp_in_s.
 void HandJudge::let_in(CycleRecord& record) noexcept {
   if (share_ >= 1.0) return;
   const double ramp_s = supervision_.ramp_in_s;
@@ -76,7 +76,7 @@ void HandJudge::let_in(CycleRecord& record) noexcept {
   record.set(RecordFlag::ramp_in, share_ < 1.0);
 }
 
-// Judges whether a hand can have made this force, given the motion that followed.
+// Checks whether a hand can have made this force, given the motion after it.
 void HandJudge::judge(const MotionCycle& cycle, const ProxyMotion& proxy, bool empty) noexcept {
   const SensorBias& bias = cycle.measured.bias;
   const ForceAndMotion now{.force_W = hand_.wrench_W().force,

@@ -6,20 +6,20 @@
 namespace proxarm::controller {
 namespace {
 
-// The bias follows the reading at rest as a low-pass with the time constant bias_s, and at most at the rate
-// bias_N_per_s. A sensor that warms up drifts by 0.01 N/s. A hand that increases its pressure by less than 0.35 N in a
-// second is taken for drift, until it presses by max_bias_drift_N.
+// The bias follows the reading at rest with the time constant bias_s, at most at bias_N_per_s. A sensor that warms up
+// drifts by 0.01 N/s. A hand that presses harder by less than 0.35 N per second counts as drift, up to
+// max_bias_drift_N.
 constexpr double bias_s = 0.35, bias_N_per_s = 0.35;
-// A torque's bias counts as the force that makes it at this lever: about a handle's length.
+// A torque's bias counts as the force that makes it at this lever, about a handle's length.
 constexpr double bias_lever_m = 0.1;
-// A jump in the tare, of which the bias takes a part. What is less leads an empty handle by 24 mm at most
-// (hand_force.hpp).
+// Largest accepted jump during the tare, a part of which enters the bias. A smaller one moves an empty handle by 24 mm
+// at most (hand_force.hpp).
 constexpr double least_tare_jump_N = 0.3;
-// What is kept as the sensor's zero for later may go by this much beside its noise meanwhile.
+// Largest spread of readings that aren't white noise, for a zero that is stored for later.
 constexpr double most_kept_N = 0.3;
-// The tare's mean is known to this many of its standard deviations.
+// Uncertainty of the tare's mean, in its standard deviations.
 constexpr double tare_deviations = 4.0;
-// Without noise the tool's pose is left, which is known to half a milliradian: half a kilogram's weight goes by 2 mN.
+// Without noise the tool's pose remains uncertain, by half a milliradian: 2 mN of the weight of half a kilogram.
 constexpr double least_open_N = 2e-3;
 
 }  // namespace
@@ -35,7 +35,7 @@ Measurement::Measurement(std::span<const DriveOnBus> drives, const fieldbus::For
   now.motor_rad = now.link_rad = now.drive_target_rad = arm.start_rad();
   now.moved_rad = now.jump_rad = now.answers.unheard_cycles = now.answers.period_s = now.gear_torque_Nm = zero;
   state_.stale_cycles = zero;
-  points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer, and all are archived
+  points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer joints, but all are archived
   arm.points(now.link_rad, points_);
 }
 
@@ -50,7 +50,7 @@ void Measurement::take() noexcept {
   read_sensor();
 }
 
-// The joints whose speed the guard of the setpoints bounds (tool_guard.hpp): the first two hardly move.
+// Only joints whose speed the tool guard bounds (tool_guard.hpp); the first two hardly move.
 void Measurement::place_elbow() noexcept {
   constexpr std::size_t first_joint = 2;
   const auto before_W = points_.joint_W;
@@ -140,7 +140,7 @@ bool Measurement::tare(const SessionSettings& settings, double tared_for_s, Alar
   return false;
 }
 
-// By which the zero that was tared may differ from the one that is known.
+// Allowed difference between the tared zero and the known one.
 double Measurement::standing_limit_N(const SessionSettings& settings) const noexcept {
   return settings.zero_drift_N + tare_error_N();
 }

@@ -8,7 +8,7 @@ namespace {
 
 using models::Vec3;
 
-// A remaining distance below this counts as none: it is an encoder's count or two.
+// A remaining distance below this counts as zero; it is one or two counts of an encoder.
 constexpr double arrived_m = 1e-5;
 
 SessionSettings plain(SessionSettings settings) {

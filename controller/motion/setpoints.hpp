@@ -1,4 +1,4 @@
-// The setpoints: what a motion makes and what the drives are sent.
+// The setpoints that a motion makes and the drives receive.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace proxarm::controller {
 
-// What the drives are told in a cycle, in the order of the joints: motor angles, or joint torques.
+// In the order of the joints: motor angles or joint torques.
 struct Setpoints {
   enum class Kind : std::uint8_t { angles_rad, torques_Nm };
   Kind kind = Kind::angles_rad;

@@ -13,17 +13,17 @@ using models::Vec3;
 
 namespace {
 
-// The share of max_torque_Nm by which a weight may be off: 0.36 Nm of models/cells/light.yaml, 0.7 N at its handle; a
+// Allowed weight error as a share of max_torque_Nm: 0.36 Nm with models/cells/light.yaml, 0.7 N at its handle; a
 // drive's friction is some tenths of that.
 constexpr double missing_share = 0.02;
-// The hold settles within 50 ms; the sensor is tared for 0.2 s.
+// The hold settles within 50 ms; the tare takes 0.2 s.
 constexpr double missing_filter_s = 0.05;
-// An encoder's step of 8 µrad is 7 mm/s at 0.9 m and 1 kHz. Behind this it is 0.7.
+// An encoder step of 8 µrad is 7 mm/s at 0.9 m and 1 kHz; filtered, 0.7 mm/s.
 constexpr double speed_filter_s = 0.01;
-// What may stay at the handle when a hand is gone: of a limp hand, a strap. While the device is braked, its inertia
-// isn't taken for a hand's force.
+// Mass that may remain at the handle without a holding hand, such as a limp hand or a strap. While the device brakes,
+// its inertia doesn't count as a hand's force.
 constexpr double left_kg = 0.5;
-// A proxy with a mass coasts; a light device is slow where it is let go, and its friction, not its mass, ends its way.
+// A proxy with a mass coasts. A released light device is slow, and its friction, not its mass, ends the motion.
 constexpr double way_share = 0.5;
 
 }  // namespace
@@ -49,7 +49,7 @@ TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const mod
                  period_s);
 }
 
-// Anchors the device where it stands until its first drive is enabled and its brake opens.
+// The device is held where it stands when the first drive is enabled and its brake opens.
 void TorqueMotion::wait_for_drives(const Measured& measured) noexcept {
   if (measured.following == 0) rendering_->anchor(measured.link_rad);
   hold(measured, 1.0);
@@ -75,7 +75,7 @@ std::optional<MissingWeight> TorqueMotion::missing_weight() const noexcept {
   return {};
 }
 
-// The force at the tool whose joint torques come closest to what is missing, (J Jᵀ)⁻¹ J τ_0; less where J is singular.
+// Least-squares force at the tool for the missing torques, (J Jᵀ)⁻¹ J τ_0; smaller near singular J.
 double TorqueMotion::missing_force_N(const JointVector& link_rad) noexcept {
   constexpr double least_lever_m = 0.01;
   arm_.kinematics(link_rad, kinematics_);
@@ -98,7 +98,7 @@ void TorqueMotion::start(const Measured& measured, Beginning /*beginning*/) noex
   if (empty_) empty_->start();
 }
 
-// A device that a hand drives back must not run away; it may be as fast as its joints may.
+// A device that a hand drives back must not run away; its joints' maximum speeds bound it.
 bool TorqueMotion::render(const MotionCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   for (Eigen::Index i = 0; i < measured.axes(); ++i) {
@@ -120,7 +120,7 @@ bool TorqueMotion::render(const MotionCycle& cycle) noexcept {
   return true;
 }
 
-// From the tool's own speed to rest while nobody holds the handle.
+// Speed bound of the tool: falls from the tool's own speed to zero while nobody holds the handle.
 double TorqueMotion::largest_tool_speed(const MotionCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   State& s = state_;

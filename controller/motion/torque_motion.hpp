@@ -1,17 +1,17 @@
-// Motion of the impedance type: joint torques that follow from the tool's position (torque_rendering.hpp). Until
-// rendering begins, the torques hold the joints where they stand. A stop is left to the drives, which bring any torque
-// to zero on their slow-down ramp (6084h). This class therefore has no run-out and no hold.
+// Motion of the impedance type: joint torques computed from the tool's position (torque_rendering.hpp). Before
+// rendering, torques hold the joints in place. The drives stop by themselves, ramping any torque to zero (6084h), so
+// this class has neither run-out nor hold.
 //
-// What the hold takes beyond the weight of the model is weight that the model lacks, seen behind a low-pass of 50 ms
-// while the sensor is tared. More than 2 % of a joint's max_torque_Nm is a fault before anything moves; less is τ_0 and
-// carried from the start on. So an empty device stands still where it starts, and elsewhere it is moved by what the
-// model's mistake differs there, and its friction.
+// During the tare, the holding torque beyond the model's weight, low-passed with 50 ms, is weight missing from the
+// model. More than 2 % of a joint's max_torque_Nm is a fault before anything moves. Less becomes τ_0 and is compensated
+// from the start on. So an empty device stands still where it starts. Elsewhere the model's error is different, and the
+// difference, less friction, moves the device.
 //
-// A handle that nobody holds (handle/empty_handle.hpp) is braked at 4 m/s², then the joints are held where they are,
-// with `let_go: hold` as with `rest`: the device goes on rendering, since it can't hold otherwise. The sensor's bias
-// leads such a device nowhere, so no force is taken for one. But a tool whose mass isn't the model's reads as a force
-// once it has turned, and lifts or drags the device as well: by τ_0 as a force at the tool, where it has turned by 60
-// degrees and the tool is all that is wrong. The handle counts as empty below that, too.
+// When nobody holds the handle (handle/empty_handle.hpp), the device is braked at 4 m/s² and its joints are then held
+// in place while it goes on rendering, with `let_go: hold` as with `rest`. The sensor's bias can't move such a device,
+// so no force counts as a bias. But a tool whose mass differs from the model's reads as a force after it has turned,
+// and lifts or drags the device: by τ_0 as a force at the tool, if it has turned by 60 degrees and only the tool is
+// wrong. The handle counts as empty below that force, too.
 #pragma once
 
 #include <memory>
@@ -27,7 +27,7 @@ namespace proxarm::controller {
 
 class TorqueMotion final : public Motion {
  public:
-  // `tool_mass_kg`: the mass of what hangs behind the sensor. Precondition: the arm outlives this object.
+  // tool_mass_kg: of everything behind the sensor. Precondition: the arm outlives this object.
   TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const models::Arm& arm,
                const std::vector<description::DriveDescription>& drives,
                const description::SupervisionDescription& supervision, double tool_mass_kg, double period_s);
@@ -62,11 +62,11 @@ class TorqueMotion final : public Motion {
  private:
   struct State {
     models::JointVector torque_Nm;
-    models::JointVector missing_Nm;  // τ_0, as the hold has shown it so far
+    models::JointVector missing_Nm;  // τ_0, as measured by the hold so far
     models::Vec3 proxy_W = models::Vec3::Zero();
-    models::Vec3 tool_k1_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();  // v: behind a low-pass
+    models::Vec3 tool_k1_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();  // v: low-passed
     double missing_N = 0.0;                                                     // τ_0 as a force at the tool
-    double braked_m_per_s = 0.0;  // the tool's bound while nobody holds it
+    double braked_m_per_s = 0.0;  // speed bound of the tool while nobody holds it
     bool braked = false;
   };
 
@@ -78,7 +78,7 @@ class TorqueMotion final : public Motion {
   const models::Arm& arm_;
   models::ToolKinematics kinematics_;
   models::JointVector max_speed_rad_per_s_, max_torque_Nm_;
-  std::optional<EmptyHandle> empty_;  // none where a handle that is let go coasts
+  std::optional<EmptyHandle> empty_;  // nullopt: a released handle coasts
   double period_s_;
   State state_;
 };

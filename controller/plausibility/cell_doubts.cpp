@@ -28,7 +28,7 @@ void judge_pose(const std::string& key, const description::PoseDescription& pose
 void judge_gravity(const description::Cell& cell, Lines& lines) {
   const std::array<double, 3>& g = cell.gravity_W_m_per_s2;
   const double size = std::hypot(g[0], g[1], g[2]);
-  if (size == 0.0) return;  // an arm without weight, for a test
+  if (size == 0.0) return;  // an arm without weight, for tests
   const std::string key = "gravity_W_m_per_s2";
   judge(key, size, {9.7, 9.9, "m/s²", {units::gravities, units::mm_per_s2, {"cm/s²", 1e-2}}}, lines);
   if (g[2] > -0.9 * size) {
@@ -38,7 +38,7 @@ void judge_gravity(const description::Cell& cell, Lines& lines) {
   }
 }
 
-// A joint, and the inertia that it moves at the start: kg m², or kg of one that slides.
+// A joint, and the inertia that it moves at the start: kg m², or kg for a linear joint.
 struct Joint {
   bool slides;
   double inertia;
@@ -73,7 +73,7 @@ void judge_counts(const std::string& key, const description::DriveDescription& d
   judge(key + ".gear_ratio", ratio, {0.5, 5000.0, "", {inverted}}, lines);
 }
 
-// The damping of a gear, beside the stiffness and the inertia behind it that it damps.
+// Judges a gear's damping by the damping ratio that it gives stiffness and inertia.
 void judge_gear_damping(const std::string& key, double damping, double stiffness, const Joint& joint, Lines& lines) {
   if (!(damping > 0.0 && stiffness > 0.0)) return;
   const double ratio = 0.5 * damping / std::sqrt(stiffness * joint.inertia);
@@ -109,7 +109,7 @@ void judge_gear(const std::string& key, const description::DriveDescription& dri
   }
 }
 
-// What a drive can give, beside what it needs to move arm and rotor at max_acceleration_rad_per_s2.
+// Judges a torque limit by the torque that moves arm and rotor at max_acceleration_rad_per_s2.
 void judge_most_torque(const std::string& key, double most, const description::DriveDescription& drive,
                        const Joint& joint, Lines& lines) {
   using description::rounded_text;
@@ -130,7 +130,7 @@ void judge_torque(const std::string& key, const description::DriveDescription& d
   judge_most_torque(key + ".max_torque_Nm", drive.max_torque_Nm, drive, joint, lines);
 }
 
-// How the simulated drive behaves.
+// The simulated drive.
 void judge_simulation(const std::string& key, const description::DriveDescription& drive, const Joint& joint,
                       Lines& lines) {
   const description::SimulatedDrive& simulation = drive.simulation;
@@ -149,7 +149,7 @@ void judge_simulation(const std::string& key, const description::DriveDescriptio
   judge(key + ".viscous_friction_Nms_per_rad", viscous / most, {0.0, 1.0, "of max_torque_Nm at full speed", {}}, lines);
 }
 
-// A hexadecimal number without its 0x is another one.
+// A device type whose 0x is missing is read as decimal.
 void judge_device_type(const std::string& key, const description::DriveDescription& drive, Lines& lines) {
   constexpr std::uint32_t profile_of_drives = 402;  // in the lower half, by CiA 402
   if (!drive.device_type || (*drive.device_type & 0xFFFFU) == profile_of_drives) return;
@@ -189,12 +189,12 @@ void judge_sensor(const description::Cell& cell, Lines& lines) {
   judge("sensor.delay_s", sensor.delay_s, {0.0, 0.03, "s", {units::ms, {"µs", 1e-6}}}, lines);
 }
 
-// A tool's mass is about where its handle is, and as wide as its inertia says.
+// The centre of mass can't be far beyond the handle and the size that the inertia implies.
 void judge_centre_of_mass(const description::ToolDescription& tool, double across_m, Lines& lines) {
   const auto length_m = [](const std::array<double, 3>& x) { return std::hypot(x[0], x[1], x[2]); };
   const double far_m = 0.1 + 2.0 * length_m(tool.handle_S.position_m) + 3.0 * across_m;
   const double found_m = length_m(tool.centre_of_mass_S_m);
-  if (found_m <= far_m || found_m > 1.0) return;  // beyond a metre it is told of already
+  if (found_m <= far_m || found_m > 1.0) return;  // beyond 1 m place_at_the_tool reports it
   lines.push_back("tool.centre_of_mass_S_m: found " + description::rounded_text(found_m) +
                   " m from the sensor, expected at most " + description::rounded_text(far_m) +
                   " m beside handle_S and inertia_kg_m2");
@@ -210,7 +210,7 @@ void judge_tool(const description::ToolDescription& tool, Lines& lines) {
     return;
   }
   const double across_m = std::sqrt(most / tool.mass_kg);
-  // Nothing is heavier than a ball of tungsten.
+  // Lower bound: radius of gyration of a solid ball of tungsten.
   const double least_m = 0.6 * std::cbrt(tool.mass_kg / 80000.0);
   if (most > 0.0) {
     judge("tool.inertia_kg_m2", most,

@@ -1,8 +1,8 @@
-// What a session's files say that is possible and yet hardly meant: values in another unit, gravity upside down, a gear
-// the wrong way round. A line each, beginning with the file; none of them is an error, since some arm may be so.
+// Finds values in a session's files that are possible but probably not meant: another unit, gravity upside down, a
+// reversed gear. One line each, beginning with the file. They aren't errors, since some arm may be like that.
 //
-// The bounds are wider than what any arm, hand or scene shipped here or made by `new-cell` has, and narrower than the
-// units that people mix up are apart.
+// The bounds are wider than the values of all arms, hands and scenes shipped here or made by `new-cell`, and narrower
+// than the ratio of units that people confuse.
 #pragma once
 
 #include <string>
@@ -21,10 +21,10 @@ std::vector<std::string> cell_doubts(const description::Cell& cell, const models
 
 std::vector<std::string> hand_doubts(const description::HandDescription& hand);
 
-// Of a register map: numbers that a manual counts from 40001.
+// Register numbers of a map that look as if they were counted from 40001, as in manuals.
 std::vector<std::string> register_doubts(const description::ModbusDriveDescription& drive);
 
-// start_W: where the tool is at the start, m. reach_m: how far no point of the arm is from its base.
+// start_W: the tool's start, m. reach_m: an upper bound on the distance of the arm's points from its base.
 std::vector<std::string> scene_doubts(const scenes::Scene& scene, const models::Vec3& start_W, double reach_m);
 
 }  // namespace proxarm::controller

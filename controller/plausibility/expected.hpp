@@ -1,4 +1,4 @@
-// Usual ranges of keys, and the units in which a value outside of them may have been written.
+// Usual ranges of keys, and units that a value outside its range may have been written in.
 #pragma once
 
 #include <numbers>
@@ -7,7 +7,7 @@
 
 namespace proxarm::controller {
 
-// Another unit in which people write this key: value × `in_key` is in the key's own.
+// Another unit that people use for this key: value × `in_key` is in the key's own unit.
 struct OtherUnit {
   const char* name;
   double in_key;
@@ -23,12 +23,12 @@ inline constexpr OtherUnit mm{"mm", 1e-3}, mm_per_s{"mm/s", 1e-3}, mm_per_s2{"mm
 
 struct Expected {
   double low, high;
-  const char* unit;               // of what is judged, "" if it has none
+  const char* unit;               // of the judged quantity; "": none
   std::vector<OtherUnit> others;  // of the value in the file
 };
 
-// What is judged in the place of a value where that says more, such as the frequency that a stiffness leads to:
-// "with which what is behind it swings at 0.4 Hz".
+// A quantity that is judged instead of the value because it is more telling, such as the frequency that follows from a
+// stiffness: "with which what is behind it swings at 0.4 Hz".
 struct Measure {
   const char* value_unit;  // of the value in the file
   double found;
@@ -36,10 +36,10 @@ struct Measure {
   std::string says;
 };
 
-// Adds "limits.leash_m: found 20 m, expected 0.0001 to 0.3; if it is in mm, write 0.02" to `lines` where the value
-// isn't expected. Of the other units those are named that lead to what is.
+// Adds a line to `lines` if the value is out of range: "limits.leash_m: found 20 m, expected 0.0001 to 0.3; if it is in
+// mm, write 0.02". It names those other units in which the value would be in range.
 void judge(const std::string& key, double value, const Expected& expected, std::vector<std::string>& lines);
-// The same by a measure of it; `expected` is the measure's.
+// The same for a measure of the value; `expected` is the measure's range.
 void judge(const std::string& key, double value, const Measure& measure, const Expected& expected,
            std::vector<std::string>& lines);
 

@@ -58,7 +58,7 @@ void BusLossSession::run_cycle(std::int64_t t_k_ns) noexcept {
   act(t_k_ns);
   if (step_ == Step::silent) return;
   fieldbus::CanFrame heartbeat;
-  fieldbus::HeartbeatProducer same = parts_.drive_buses.front().heartbeat;  // those of all buses begin in one cycle
+  fieldbus::HeartbeatProducer same = parts_.drive_buses.front().heartbeat;  // those of all buses start in one cycle
   heartbeat_was_last_ = same.due(t_k_ns, cycle_, heartbeat);
   bus_.send_setpoints(setpoints_, t_k_ns, cycle_);
   bus_.hand_over();
@@ -97,7 +97,7 @@ void BusLossSession::act(std::int64_t t_k_ns) noexcept {
       supervisor_.handle(Event::tared);
       return go_to(Step::standing, t_k_ns);
     case Step::standing:
-      // The silence begins right after a heartbeat. This is the worst moment: drives that monitor it wait longest then.
+      // The silence begins right after a heartbeat, the worst moment: drives that monitor it then wait longest.
       if (in_step_ns >= standing_ns && heartbeat_was_last_) go_to(Step::silent, t_k_ns);
       return;
     case Step::farewell:
@@ -126,7 +126,7 @@ void BusLossSession::wait_for_drives(std::int64_t t_k_ns) noexcept {
   go_to(Step::farewell, t_k_ns);
 }
 
-// By the time that the silence is judged, the frames of the last cycle have arrived; no drive reacts to these.
+// When the silence is judged, the frames of the last cycle have arrived; no drive reacts to these.
 void BusLossSession::listen(std::int64_t until_ns) noexcept {
   fieldbus::TimedFrame received;
   do {
@@ -149,7 +149,7 @@ void BusLossSession::go_to(Step step, std::int64_t t_k_ns) noexcept {
     bus_.request(fieldbus::DriveGoal::operation_enabled);
   } else if (step == Step::silent) {
     since_ns_ = silence_ns_ = last_word_ns_;
-    bus_.request(fieldbus::DriveGoal::none);  // sends no frame, but what the drives report from now on isn't a fault
+    bus_.request(fieldbus::DriveGoal::none);  // sends no frame; the drives' reports no longer count as faults
   } else if (step == Step::farewell) {
     bus_.request(fieldbus::DriveGoal::none);
     send_nmt(fieldbus::NmtCommand::start);  // for drives that have left NMT operational

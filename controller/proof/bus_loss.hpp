@@ -1,13 +1,14 @@
-// What each drive does when the controller dies, tried on purpose: while the arm stands with its drives enabled,
-// sending stops, and the answers of the drives are observed.
+// Tests how each drive reacts when the controller dies: while the arm stands with its drives enabled, sending stops,
+// and the drives' answers are observed.
 //
 //   waiting, enabling, taring, standing for 0.3 s   under the same supervision as any session
-//   silent for a second   from right after a heartbeat on, which is the worst moment: no SYNC, no setpoint, no
-//                         heartbeat, no SDO; frames are only received
-//   farewell              SYNC, heartbeat and controlwords again, until all drives are off or half a second has passed
+//   silent for a second   no SYNC, setpoint, heartbeat or SDO; frames are only received. The silence begins right after
+//   a
+//                         heartbeat, the worst moment
+//   farewell              SYNC, heartbeat and controlwords again, until all drives are off or for half a second
 //
-// If a drive lets go, its brake holds the axis or the axis sinks, as when a controller dies in a session. run_cycle()
-// neither allocates, locks, throws nor prints.
+// If a drive switches off, its brake holds the axis or the axis sinks, as when a controller dies in a session.
+// run_cycle() never allocates, locks, throws or prints.
 #pragma once
 
 #include <atomic>
@@ -31,15 +32,15 @@ namespace proxarm::proof {
 // The reaction of one drive on CAN.
 struct OwnStop {
   std::string joint;
-  double reacts_s = -1.0;  // after the controller's last frame; negative: no reaction was seen
-  double off_s = -1.0;     // when its statusword reported that it is off; negative: it didn't
+  double reacts_s = -1.0;  // after the controller's last frame; negative: no reaction seen
+  double off_s = -1.0;     // when its statusword reported that it is off; negative: never
   std::string signs;       // its reactions, in words
   bool off_at_last = false;
 };
 
 class BusLossSession {
  public:
-  // Precondition: the drives have been configured to send the objects that silence_watch.hpp observes.
+  // Precondition: the drives are configured to send the objects that silence_watch.hpp observes.
   BusLossSession(controller::CycleParts parts, const controller::SessionSettings& settings,
                  const description::Cell& cell);
   BusLossSession(const BusLossSession&) = delete;
@@ -47,18 +48,18 @@ class BusLossSession {
 
   void run_cycle(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool done() const noexcept { return step_ == Step::done; }
-  // Whether nothing is to be sent; a late cycle doesn't matter then.
+  // Whether nothing is being sent; a late cycle then doesn't matter.
   [[nodiscard]] bool silent() const noexcept { return step_ == Step::silent; }
-  // Precondition: done(). Asks each drive by SDO that hasn't said that it is off: one that refuses NMT start after the
-  // silence, as a stack does that holds an error, sends no TPDO any more. Blocks; not for the cycle.
+  // Asks by SDO each drive that hasn't reported that it is off. A drive that refuses NMT start after the silence,
+  // because its stack holds an error, sends no TPDOs. Blocks; not for the cycle. Precondition: done().
   void ask_the_others();
   void shut_down() noexcept { bus_.shut_down(controller::ns_of(settings_.period_s)); }
   void request_stop() noexcept { stop_.store(true); }  // any thread
-  // Whether the enabling switch has to be released and pressed.
+  // Whether the enabling switch must be released and pressed.
   [[nodiscard]] bool asks_for_press() const noexcept { return asks_for_press_.load(); }
 
   // ---- after the last cycle
-  // The drives' reactions; empty if the session didn't get as far as the silence.
+  // The drives' reactions; empty if the session ended before the silence.
   [[nodiscard]] std::vector<OwnStop> own_stops() const;
   [[nodiscard]] const controller::FaultReport& fault() const noexcept {
     return supervisor_.faulted() ? supervisor_.report() : supervisor_.held_for();
@@ -90,7 +91,7 @@ class BusLossSession {
   NoListener listener_;
   controller::Setpoints setpoints_;
   std::vector<fieldbus::SilenceWatch> watches_;
-  std::vector<fieldbus::DriveState> last_states_;  // of the drives on CAN, once they have been asked
+  std::vector<fieldbus::DriveState> last_states_;  // of the drives on CAN, after ask_the_others()
   Step step_ = Step::waiting;
   std::int64_t since_ns_ = 0, last_word_ns_ = -1;
   bool heartbeat_was_last_ = false;  // the last cycle sent a heartbeat

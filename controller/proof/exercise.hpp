@@ -1,4 +1,4 @@
-// A motion about a station and what is measured meanwhile, for who wants more than readings at rest.
+// A motion about a station with measurements during the motion, for callers that need more than readings at rest.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +10,19 @@
 
 namespace proxarm::proof {
 
-// What a cycle knows, before it sends its setpoints.
+// The cycle's measurements, before it sends its setpoints.
 struct Exercised {
   const controller::Measured& measured;
   std::span<const controller::DriveOnBus> drives;
 };
 
-// Called in the cycle: nothing here may allocate, lock or throw.
+// Called in the cycle: must not allocate, lock or throw.
 class Exercise {
  public:
   virtual ~Exercise() = default;
 
-  // How far the motors are to be from the station, in rad, at this time of the exercise. Zero, and at rest, at 0 and
-  // from lasts_s() on.
+  // The motors' offset from the station at this time of the exercise, rad. Zero and at rest at time 0 and from
+  // lasts_s() on.
   [[nodiscard]] virtual models::JointVector offset_rad(std::size_t station, double time_s) const noexcept = 0;
   [[nodiscard]] virtual double lasts_s(std::size_t station) const noexcept = 0;
   virtual void take(std::size_t station, double time_s, const Exercised& cycle) noexcept = 0;

@@ -18,14 +18,14 @@ using models::JointVector;
 using models::Mat3;
 using models::Vec3;
 
-// As a share of the tool's weight: if a joint's turn changes the reading by less than this, it is proven by pushes.
+// A joint whose turn changes the reading by less than this share of the tool's weight is proven by pushes.
 constexpr double shown_by_weight = 0.08;
 constexpr int poses_tried = 400;
 
 struct Mistake {
   std::string name;
-  std::function<JointVector(JointVector)> motors;  // the motors' true angles, from those that the cell computes
-  Mat3 reading = Mat3::Identity();                 // the force as the sensor reads it, from the true one
+  std::function<JointVector(JointVector)> motors;  // maps the motors' angles by the cell to their true angles
+  Mat3 reading = Mat3::Identity();                 // maps the true force to the sensor's reading
 };
 
 Mat3 turned(double angle_rad, const Vec3& axis) { return Eigen::AngleAxisd(angle_rad, axis).toRotationMatrix(); }
@@ -71,7 +71,7 @@ std::vector<Mistake> all_mistakes(const description::Cell& cell) {
   return mistakes;
 }
 
-// A unit force along `along_W`, expressed in S.
+// A unit vector along `along_W`, expressed in S.
 Vec3 in_sensor(const models::Arm& arm, const JointVector& motor_rad, const Vec3& along_W) {
   return arm.sensor_pose(arm.link_from_motor(motor_rad)).linear().transpose() * along_W;
 }
@@ -126,7 +126,7 @@ Explanation explain(const description::Cell& cell, const models::Arm& arm, const
   return {mistake.name, residual(arm, weight_W, readings, mistake), largest_angle(arm, readings, mistake)};
 }
 
-// The change of the weight's direction in S when each joint is turned, by joint, for a given pose.
+// For each joint, the change of the weight's direction in S when the joint is turned from this pose.
 JointVector shown(const description::Cell& cell, const models::Arm& arm, const JointVector& motor_rad) {
   const Vec3 down_W = Vec3(cell.gravity_W_m_per_s2.data()).normalized();
   const Vec3 here = in_sensor(arm, motor_rad, down_W);
@@ -139,8 +139,7 @@ JointVector shown(const description::Cell& cell, const models::Arm& arm, const J
   return changes;
 }
 
-// Chooses the pose that best shows the joint that is least visible in it. Joints that no pose nearby shows are left
-// out.
+// Chooses the pose that best shows its least visible joint. Joints that no pose nearby shows are left out.
 JointVector best_pose(const description::Cell& cell, const models::Arm& arm, const JointVector& motor_rad) {
   models::Random random(1);
   std::vector<JointVector> tried{motor_rad};
@@ -173,8 +172,8 @@ JointVector best_pose(const description::Cell& cell, const models::Arm& arm, con
   return tried[best];
 }
 
-// A mistake rivals the cell's description if its residual and angle are at most twice as large. Noise and the error of
-// a careful hand are the least that counts.
+// A mistake rivals the cell if its residual and angle are at most twice as large; both count at least as noise and a
+// careful hand's error.
 bool rivals(const Explanation& mistake, const Explanation& as_it_is) {
   constexpr double noise = 0.05, careful_rad = 0.07, clearly = 2.0;
   if (!as_it_is.explains()) return true;

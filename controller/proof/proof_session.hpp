@@ -1,14 +1,13 @@
-// The session in which an arm is proven: by small slow motions of each joint and by pushes, under the same supervision
-// as any other session. With other stations than a proof's it reads whatever is read of an arm that stands: Task.
+// Runs the session that proves an arm, by small slow motions of each joint and by pushes, under the same supervision as
+// any session. With a Task it reads the resting arm at other stations.
 //
-// After enabling and taring, the session follows its plan: move, settle, exercise if there is one, read; and where a
-// push is needed: wait for it, read, wait for its end. Then the drives are switched off, and the brakes are watched for
-// a second.
+// After enabling and taring, the session follows its plan at each station: move, settle, exercise if there is one,
+// read; for a push: wait for it, read, wait for its end. Then it switches the drives off and watches the brakes for a
+// second.
 //
 // The tool moves at proof_speed_m_per_s at most, and joints move on minimum-jerk paths from rest to rest. Any fault,
-// any hold, and an enabling input that is released end the session: the motion runs out within a tenth of a second, and
-// the drives are switched off. run_cycle() neither allocates, locks, throws nor prints. begin_plan() does; it is called
-// between cycles.
+// any hold and a released enabling input end the session: the motion runs out within a tenth of a second, and the
+// drives are switched off. run_cycle() never allocates, locks, throws or prints. begin_plan() does, between cycles.
 #pragma once
 
 #include <atomic>
@@ -32,18 +31,17 @@
 
 namespace proxarm::proof {
 
-// The tool's speed limit. The paths are slower; a speed by the encoders of more than 1.2 times this is tool_too_fast.
+// The tool's speed limit. Paths are slower; a measured speed above 1.2 times this is tool_too_fast.
 inline constexpr double proof_speed_m_per_s = 0.1;
 
-// What the person is asked to do, as one number that another thread may read.
+// What the person is asked to do; another thread may read it.
 enum class Asked : std::uint8_t { nothing, press, push, let_go };
 
-// Where the arm goes, from the motors' angles at which it was found, and how long it stands there: before it is read,
-// and while it is.
+// The stations, computed from the motors' initial angles, and the times for settling and reading at each station.
 struct Task {
-  std::function<std::vector<Station>(const models::JointVector& motor_rad)> stations;  // empty: the proof's, plan()
+  std::function<std::vector<Station>(const models::JointVector& motor_rad)> stations;  // empty: plan()
   double settle_s = 0.4, read_s = 0.3;
-  std::shared_ptr<Exercise> exercise = nullptr;  // between settling and reading; null: the arm only stands
+  std::shared_ptr<Exercise> exercise = nullptr;  // between settling and reading; null: none
 };
 
 class ProofSession {
@@ -54,7 +52,7 @@ class ProofSession {
   ProofSession& operator=(const ProofSession&) = delete;
 
   void run_cycle(std::int64_t t_k_ns) noexcept;
-  // Whether the arm stands and waits for its plan, which begin_plan() makes. That throws SetupError if there is none.
+  // Whether the arm stands and waits for its plan. begin_plan() makes it, and throws SetupError if none is possible.
   [[nodiscard]] bool needs_plan() const noexcept;
   void begin_plan();
   [[nodiscard]] bool done() const noexcept { return supervisor_.phase() == controller::Phase::done; }
@@ -63,7 +61,7 @@ class ProofSession {
   // ---- any thread
   void request_stop() noexcept { stop_.store(true); }
   [[nodiscard]] Asked asked() const noexcept { return asked_.load(); }
-  // The station of the push that is asked for, an index of readings and stations.
+  // The station of the requested push, an index of readings and stations.
   [[nodiscard]] std::size_t station() const noexcept { return station_.load(); }
 
   // ---- between cycles
@@ -74,17 +72,17 @@ class ProofSession {
   // Whether the session waited in vain for a push or for its end.
   [[nodiscard]] bool not_pushed() const noexcept { return not_pushed_; }
   [[nodiscard]] const std::vector<Reading>& readings() const noexcept { return readings_; }
-  // The fault that stopped the arm, or that caused the hold before it; Fault::none if there was no fault.
+  // The fault that stopped the arm or caused the hold before; Fault::none: no fault.
   [[nodiscard]] const controller::FaultReport& fault() const noexcept {
     return supervisor_.faulted() ? supervisor_.report() : supervisor_.held_for();
   }
-  // By how much the joints moved while their brakes held them, rad; nullopt if the session didn't get that far.
+  // How far the joints moved on their brakes, rad; nullopt if the session ended before.
   [[nodiscard]] std::optional<double> slipped_rad() const noexcept { return slipped_rad_; }
   [[nodiscard]] const controller::CycleParts& parts() const noexcept { return parts_; }
 
  private:
   enum class Step : std::uint8_t { moving, settling, exercising, waiting, reading, releasing };
-  // The samples of the reading that is under way.
+  // The samples of the present reading.
   struct Gathered {
     models::Wrench sum_S, last_S, step_squares_S;
     int samples = 0;
@@ -134,7 +132,7 @@ class ProofSession {
   std::vector<Station> stations_;
   std::vector<Reading> readings_;
   Step step_ = Step::moving;
-  double step_s_ = 0.0, pressed_s_ = 0.0;  // the time in this step; how long a push, or its end, has lasted
+  double step_s_ = 0.0, pressed_s_ = 0.0;  // the time in this step; the duration so far of a push or of its end
   models::JointVector from_rad_, way_rad_;
   double duration_s_ = 0.0, path_s_ = 0.0, exercise_s_ = 0.0, rate_ = 1.0;
   models::Vec3 unpushed_S_ = models::Vec3::Zero();

@@ -64,7 +64,7 @@ ProxyFault AdmittanceProxy<N>::step(const V& h) noexcept {
   return ProxyFault::none;
 }
 
-// Computes what doesn't change from step to step.
+// Computes the coefficients that stay constant from step to step.
 template <int N>
 void AdmittanceProxy<N>::prepare() noexcept {
   const double M = config_.mass_kg, B = config_.damping_Ns_per_m, K_v = config_.spring_N_per_m;

@@ -25,8 +25,8 @@ Turned parts_of(const Eigen::Quaterniond& turn, const Vec3& axis) noexcept {
   return {models::rotation_vector(turn * about(axis, -twist)), twist};
 }
 
-// A step along both borders may be longer than one that is nearest to them. Each time it is shortened, what it is too
-// long by falls to a thousandth or so: it has no more than 0.1 rad.
+// A step along both borders may be longer than allowed. Each shortening reduces the excess to about a thousandth, since
+// a step has at most 0.1 rad.
 constexpr int kShorter = 3;
 
 bool is_range(double most) noexcept { return (most >= 0.0 && most <= 3.0) || most == AxisRange::everything; }
@@ -56,7 +56,7 @@ bool AxisRange::keep(const Eigen::Quaterniond& start, const Eigen::Quaterniond& 
   if (!tilted && !twisted) return false;
   if (tilted) now.tilt *= most_tilt / tilt;
   if (twisted) now.twist = std::clamp(now.twist, -most_twist, most_twist);
-  // Tilt and twist bend: the step to a border may be longer than the one that was asked for, and would be a push.
+  // Tilt and twist are curved: the step to a border may be longer than the requested one and would push the hand.
   const double asked = models::rotation_vector(to * from.conjugate()).norm();
   const double most_rad = std::min(step.most_rad, std::max(asked, TurnSets::returning_rad_per_s * step.period_s));
   double share = 1.0;

@@ -1,15 +1,13 @@
 // Impedance-type rendering with the same 𝒢: measured tool position in, force for the actuators out.
 //
-// The four laws are those of Kikuuwe and Fujimoto (World Haptics 2007), whose experiment (Fig. 5) compares three of
-// them:
+// Four laws of Kikuuwe and Fujimoto (World Haptics 2007), whose experiment (Fig. 5) compares three of them:
 //   plain          q = 𝒢(K, p, q₁),  f = K(q − p)                                        (1)
 //   damped_motion  q = 𝒢(K, p, q₁),  f = K(q − p) + B(∇q − ∇p)/T                         (5)   can suck at release
 //   damped_tool    q = 𝒢(K, p, q₁),  f = K(q − p) − B∇p/T                                (6)   drags in free space
 //   implicit       p̂ = p + B(q₁ − p₁)/(KT + B),  q = 𝒢(K + B/T, p̂, q₁),  f = (K + B/T)(q − p̂)   (23)   neither
-// with q₁ = q(k−1), p₁ = p(k−1), ∇x = x(k) − x(k−1). p is the tool, f the force on the hand; one frame, metres,
-// newtons.
+// with q₁ = q(k−1), p₁ = p(k−1), ∇x = x(k) − x(k−1). p: tool; f: force on the hand. One frame, metres, newtons.
 //
-// One caller at a time; step() is for the cycle: it neither allocates, locks, throws nor prints.
+// One caller at a time. step() may be called in the cycle: it doesn't allocate, lock, throw or print.
 #pragma once
 
 #include <cmath>
@@ -29,7 +27,7 @@ struct ImpedanceConfig {
   double period_s = 1e-3;            // T, > 0
   ImpedanceLaw law = ImpedanceLaw::implicit;
 
-  // Throws description::SetupError that names the option.
+  // Throws description::SetupError with the option's name.
   void validate() const;
 };
 
@@ -38,12 +36,12 @@ class ImpedanceProxy {
  public:
   using V = models::Vec<N>;
 
-  // Validates `config`. Precondition: `g` is used by this proxy alone and outlives it.
+  // Validates `config`. Precondition: only this proxy uses `g`, which outlives it.
   ImpedanceProxy(const ImpedanceConfig& config, models::GeometricAlgorithm<N>& g) : config_(config), g_(&g) {
     config_.validate();
   }
 
-  // Tool and proxy start at rest at p. If p or the time isn't finite, returns false and changes nothing.
+  // Starts tool and proxy at rest at p. If p or the time isn't finite, returns false and changes nothing.
   bool start(const V& p, double time_s = 0.0) noexcept {
     if (!p.allFinite() || !std::isfinite(time_s)) return false;
     q_k1_ = p_k1_ = p_hat_ = p;
@@ -53,7 +51,7 @@ class ImpedanceProxy {
     return true;
   }
 
-  // One period with the tool measured at p(k). After a fault nothing has changed.
+  // One period with the tool measured at p(k). A fault leaves everything unchanged.
   [[nodiscard]] ProxyFault step(const V& p) noexcept {
     if (!p.allFinite()) return ProxyFault::input_not_finite;
     const double K = config_.stiffness_N_per_m, B = config_.damping_Ns_per_m, T = config_.period_s;
@@ -78,7 +76,7 @@ class ImpedanceProxy {
   [[nodiscard]] const V& q() const noexcept { return q_k1_; }
   [[nodiscard]] const V& f() const noexcept { return f_; }
   [[nodiscard]] const V& p_hat() const noexcept { return p_hat_; }
-  // κ, the stiffness that 𝒢 is called with.
+  // κ, the stiffness passed to 𝒢.
   [[nodiscard]] double kappa_N_per_m() const noexcept {
     const bool implicit = config_.law == ImpedanceLaw::implicit;
     return config_.stiffness_N_per_m + (implicit ? config_.damping_Ns_per_m / config_.period_s : 0.0);

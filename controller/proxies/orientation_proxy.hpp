@@ -1,27 +1,24 @@
-// The tool's orientation: it is held, or it turns freely with an inertia, a damping and a spring of its own. Held is
-// the same with J → ∞.
+// The tool's orientation: held, or turning freely with an inertia, a damping and a spring. Held is the limit J → ∞.
 //
-//   J dω/dt + Dω + K φ = τ,  dR/dt = [ω]ₓ R     J, D, K scalars: a ball, so no preferred axis; R = exp([φ]ₓ) R_ref
-//   ω(k) = (J + T D + T² K)⁻¹ (J ω(k−1) + T τ(k) − T K φ(k−1))      implicit in D and K: none is too strong
+//   J dω/dt + Dω + K φ = τ,  dR/dt = [ω]ₓ R     J, D, K scalars: the same about all axes; R = exp([φ]ₓ) R_ref
+//   ω(k) = (J + T D + T² K)⁻¹ (J ω(k−1) + T τ(k) − T K φ(k−1))      implicit in D and K: stable at any size
 //   R(k) = exp([T ω(k)]ₓ) R(k−1)
-// For small angles this is (26) with B and K_v, its label included: R(k) is the orientation at t_{k+1}. Without damping
-// a constant torque gives the exact parabola of angles; with it ω tends to τ/D for any T.
+// For small angles this is (26) with B and K_v, label included: R(k) is the orientation at t_{k+1}. Without damping a
+// constant torque gives the exact parabola of angles; with damping ω tends to τ/D for any T.
 //
-// What hangs behind the sensor is felt by itself, as it is with the mass. Its inertia I about the rendered point is a
-// tensor that turns with the tool, so the proxy has J E − R I Rᵀ in the place of J, and gets back the gyroscopic torque
-// that the sensor reads, ω × R I Rᵀ ω. What the hand feels is then J about every axis. (The tool's centre of mass
-// beside the rendered point also couples turning with moving. A point tool neglects this; a rigid tool doesn't:
-// pose_proxy.hpp.)
+// The hand feels the tool behind the sensor directly, as with the mass. The tool's inertia I about the rendered point
+// turns with the tool. So J E − R I Rᵀ replaces J, and the gyroscopic torque ω × R I Rᵀ ω, which the sensor reads, is
+// added back: the hand feels J about every axis. (A centre of mass beside the rendered point also couples turning with
+// moving. A point tool neglects this; a rigid tool doesn't: pose_proxy.hpp.)
 //
 // Limits: the motion is projected onto the sets of turning (turn_sets.hpp), counted from the orientation at the first
 // start. The projected motion becomes the history, so nothing winds up.
 //
-// The spring's R_ref is the orientation at the first start, but for a while after the spring has become stiffer and
-// after a hold: then it is where the spring's torque is what it was (zero after a hold), and returns at
-// TurnSets::returning_rad_per_s. So nothing jumps.
+// The spring's R_ref is the orientation at the first start. When the spring becomes stiffer, R_ref jumps to the place
+// that keeps the spring's torque; after a hold, to zero torque. It then returns at TurnSets::returning_rad_per_s.
 //
-// τ is the torque about the rendered point, in W; R_WT is a quaternion that is kept unit. One caller at a time. step()
-// is for the cycle: it neither allocates, locks, throws nor prints.
+// τ: torque about the rendered point, in W. R_WT is kept a unit quaternion. One caller at a time. step() may be called
+// in the cycle: it doesn't allocate, lock, throw or print.
 #pragma once
 
 #include <cstdint>
@@ -34,15 +31,15 @@
 namespace proxarm::controller {
 
 struct OrientationConfig {
-  bool free = false;            // false: held as it was at the start
-  double inertia_kg_m2 = 0.05;  // J > 0; the felt one, more than `behind_sensor_T` has about any axis
+  bool free = false;                                    // false: held at the start orientation
+  double inertia_kg_m2 = 0.05;                          // J > 0, as felt; larger than behind_sensor_T about any axis
   models::Mat3 behind_sensor_T = models::Mat3::Zero();  // I, about the rendered point, along T's axes; kg m²
   double damping_Nms_per_rad = 0.5;                     // D ≥ 0
   double spring_Nm_per_rad = 0.0;                       // K ≥ 0
-  TurnSets turn{};         // speed > 0, at most 0.1 rad in a period; counted from the orientation at the first start
+  TurnSets turn{};         // speed > 0, at most 0.1 rad per period; counted from the first start
   double period_s = 1e-3;  // T > 0
 
-  // Throws description::SetupError that names the key.
+  // Throws description::SetupError with the key's name.
   void validate() const;
 };
 
@@ -52,33 +49,33 @@ class OrientationProxy {
 
   // Precondition: the configuration with this period passes validate().
   void set_period(double period_s) noexcept { config_.period_s = period_s; }
-  // Starts at rest at R. If R isn't a unit quaternion to within 1e-6, returns false and changes nothing. The first
-  // start is where the range of angles and the spring are counted from; a later one is after a hold.
+  // Starts at rest at R. If R isn't a unit quaternion within 1e-6, returns false and changes nothing. Angles and spring
+  // count from the first start; later starts follow a hold.
   bool start(const Eigen::Quaterniond& R_WT) noexcept;
-  // The range of angles is counted from here, whatever the first start was.
+  // The range of angles counts from here, instead of the first start.
   void count_from(const Eigen::Quaterniond& R_WT) noexcept {
     R_start_ = R_WT;
     started_ = true;
   }
-  // The arm couldn't follow: the motion goes on from here with this angular velocity.
+  // The arm couldn't follow: the motion continues from here with this angular velocity.
   bool resume(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W) noexcept;
-  // Take effect with the next step, without a jump. A value out of range changes nothing.
+  // Act from the next step on, without a jump. A value out of range changes nothing.
   void set_inertia(double inertia_kg_m2, const models::Mat3& behind_sensor_T) noexcept;
   void set_damping(double damping_Nms_per_rad) noexcept;
   void set_spring(double spring_Nm_per_rad) noexcept;
-  // Damping beside D from the next step on (passivity.hpp).
+  // Damping in addition to D from the next step on (passivity.hpp).
   void add_damping(double damping_Nms_per_rad) noexcept;
-  // A share of the speed limit, from 0 to 1, while the tool is slowed.
+  // Share of the speed limit, 0 to 1, while the tool is slowed.
   void limit_speed(double share) noexcept { speed_share_ = share; }
-  // One period under the torque τ(k). After a fault nothing has changed.
+  // One period under the torque τ(k). A fault leaves everything unchanged.
   [[nodiscard]] ProxyFault step(const models::Vec3& torque_W_Nm) noexcept;
 
   [[nodiscard]] const Eigen::Quaterniond& R_WT() const noexcept { return R_WT_; }
   [[nodiscard]] const models::Vec3& velocity_W() const noexcept { return omega_W_; }  // rad/s, mean over the last step
-  // D of a step, with what was added.
+  // D plus the added damping.
   [[nodiscard]] double damping_Nms_per_rad() const noexcept { return config_.damping_Nms_per_rad + added_; }
   [[nodiscard]] double kinetic_J() const noexcept;
-  // By which limits held the last step back.
+  // Torque by which limits held the last step back.
   [[nodiscard]] const models::Vec3& limit_torque_W() const noexcept { return limit_torque_W_; }
   [[nodiscard]] bool speed_limited() const noexcept { return speed_limited_; }  // in the last step
   [[nodiscard]] bool angle_limited() const noexcept { return angle_limited_; }
@@ -88,7 +85,7 @@ class OrientationProxy {
           config_.damping_Nms_per_rad, config_.spring_Nm_per_rad, added_);
   }
 
-  // The sets of turning in the next step.
+  // Sets of turning for the next step.
   [[nodiscard]] TurnSets sets() const noexcept {
     TurnSets sets = config_.turn;
     sets.home = R_start_;
@@ -98,7 +95,7 @@ class OrientationProxy {
   }
 
  private:
-  // J + T D + T² K, less what hangs behind the sensor.
+  // J + T D + T² K, less the tool behind the sensor.
   [[nodiscard]] models::Mat3 impedance_W() const noexcept;
   [[nodiscard]] models::Vec3 next_velocity(const models::Vec3& torque_W_Nm) noexcept;
   void return_reference() noexcept;

@@ -15,8 +15,8 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-// What would turn by more in a step comes around and pulls back, at a whole turn by nothing: as 10 Nm do with 3e-5 kg
-// m² at 250 Hz. It pulls as if to here.
+// Largest turn per step. A larger one would wrap around and pull back (a full turn wouldn't pull at all); 10 Nm on 3e-5
+// kg m² at 250 Hz make one. Larger turns pull as if they were this size.
 constexpr double kMostTurn_rad = 1.0;
 
 Mat3 cross_matrix(const Vec3& v) noexcept {
@@ -31,7 +31,7 @@ bool in_range(const PoseConfig& c) noexcept {
          is_not_negative(c.turning_spring_Nm_per_rad) && is_positive(c.period_s);
 }
 
-// M₆ along the axes that c and I are along.
+// M₆ in the axes of c and I.
 Mat6 mass_matrix(const PoseConfig& config, const Vec3& centre_m, const Mat3& inertia_kg_m2) noexcept {
   Mat6 M = Mat6::Zero();
   M.topLeftCorner<3, 3>() = config.mass_kg * Mat3::Identity();
@@ -41,7 +41,7 @@ Mat6 mass_matrix(const PoseConfig& config, const Vec3& centre_m, const Mat3& ine
   return M;
 }
 
-// A matrix of six rows is factored here only at set-up and with a change.
+// Factorises only at set-up and after a change.
 bool is_positive_definite(const Mat6& A) noexcept {
   const Eigen::LLT<Mat6> factor(A);
   return factor.info() == Eigen::Success;
@@ -78,7 +78,7 @@ void PoseProxy::start(const ToolPose& q, double time_s) noexcept {
   make_K();
 }
 
-// An object that moves comes, to the bit, from where the step before took it.
+// Moving objects must start, to the bit, at the place where the last step left them.
 void PoseProxy::tell_time() noexcept {
   if (g_->wants_time()) g_->set_time({time_s_, config_.period_s});
 }
@@ -93,7 +93,7 @@ void PoseProxy::resume(const ToolPose& q, const Twist& velocity_W) noexcept {
   make_K();
 }
 
-// M₆ in W, of the present orientation, and K.
+// Computes K, and M₆ in W for the present orientation.
 void PoseProxy::make_K() noexcept {
   const double T = config_.period_s;
   const Mat3 R = q_k1_.orientation.toRotationMatrix();

@@ -1,5 +1,5 @@
-// The parts of one step of a proxy, by whichever method it is computed: its parameters, its history, p̂ as a weighted
-// sum of that history, and the evaluation of 𝒢.
+// The parts of a proxy's step that all methods share: parameters, history, p̂ as a weighted sum of that history, and
+// the evaluation of 𝒢.
 //
 // All vectors in one frame, metres, newtons, seconds. n = 1, 2 or 3.
 #pragma once
@@ -14,34 +14,33 @@ namespace proxarm::controller {
 struct AdmittanceConfig {
   double mass_kg = 4.0;           // M of (26), > 0: the felt mass less the handle's
   double damping_Ns_per_m = 0.0;  // B ≥ 0
-  double spring_N_per_m = 0.0;    // K_v ≥ 0, towards the reference (set_reference(); at first the start position)
+  double spring_N_per_m = 0.0;    // K_v ≥ 0, towards the reference (set_reference(); initially the start position)
   double period_s = 1e-3;         // T, > 0
   int order = 1;                  // 1: the paper's (26). 2: (26) with forces weighted over steps (force_weights.hpp)
 
-  // Throws description::SetupError that names the option.
+  // Throws description::SetupError with the option's name.
   void validate() const;
 };
 
 enum class ProxyFault : std::uint8_t {
   none,
-  input_not_finite,   // the force (admittance), position (impedance) or torque was NaN or infinite
-  result_not_finite,  // finite input, but p̂ left the range of double, or 𝒢 returned something that isn't finite
-  squeezed,           // objects that move left no room (RenderedWorld)
+  input_not_finite,   // force (admittance), position (impedance) or torque was NaN or infinite
+  result_not_finite,  // finite input, but p̂ overflowed or 𝒢 returned a value that isn't finite
+  squeezed,           // moving objects left no room (RenderedWorld)
 };
 
-// Where a motion starts, at time t₀.
+// The start of a motion, at time t₀.
 template <int N>
 struct ProxyStart {
   models::Vec<N> q = models::Vec<N>::Zero();
   models::Vec<N> v = models::Vec<N>::Zero();
   models::Vec<N> a = models::Vec<N>::Zero();
   double time_s = 0.0;
-  // Order 2: the contacts of the first step were there before it, so it is no impact, and `a` is the acceleration of a
-  // proxy on which they act.
+  // Order 2: the contacts of the first step existed before, so it is no impact, and `a` includes their forces.
   bool contact_established = false;
 };
 
-// The history that a step uses; finite throughout.
+// History used by a step; all finite.
 template <int N>
 struct ProxyHistory {
   models::Vec<N> q_k1 = models::Vec<N>::Zero(), q_k2 = models::Vec<N>::Zero();  // q(k−1), q(k−2)
@@ -49,7 +48,7 @@ struct ProxyHistory {
   double period_k1_s = 0.0;                                                     // time between them
 };
 
-// The coefficients of (26) that follow from M, B, K_v and T:
+// Coefficients of (26) from M, B, K_v and T:
 //   p̂ = q₁ + of_move (q₁ − q₂) + of_reference (q_ref − q₁) + compliance h
 struct ProxyRule {
   double kappa = 0.0, compliance = 0.0;  // κ, 1/κ
@@ -57,27 +56,27 @@ struct ProxyRule {
   bool plain = true;  // no B, no K_v, equal intervals: (26a) as in the paper
 };
 
-// The result of a step that has been tried. The proxy takes it over if there was no fault.
+// Result of a trial step. The proxy takes it over unless there was a fault.
 template <int N>
 struct ProxyTrial {
   double kappa = 0.0;
   models::Vec<N> p_hat, q, f;
 };
 
-// Evaluates q = 𝒢(κ, p̂, q_previous), with nothing but finite numbers in and out.
+// Evaluates q = 𝒢(κ, p̂, q_previous); finite numbers in and out.
 template <int N>
 class ProxySolver {
  public:
   explicit ProxySolver(models::GeometricAlgorithm<N>& g) : g_(&g), timed_(g.wants_time()) {}
 
-  // Whether 𝒢 depends on time; if so, set_time() must be called before each step.
+  // Whether 𝒢 depends on time; then set_time() must be called before each step.
   [[nodiscard]] bool timed() const noexcept { return timed_; }
   // Sets the time label of the next q(k).
   void set_time(double time_s) noexcept { time_s_ = time_s; }
   [[nodiscard]] models::GeometricAlgorithm<N>& g() const noexcept { return *g_; }
 
-  // Computes trial.q and trial.f from trial.kappa and trial.p_hat. `law_period_s`: the T that 𝒢's velocity laws use for
-  // the way from `q_previous`. Precondition: the history is finite; anything else that isn't shows in p̂.
+  // Computes trial.q and trial.f from trial.kappa and trial.p_hat. law_period_s: T for 𝒢's velocity laws, for the way
+  // from q_previous. Precondition: the history is finite; other values that aren't finite show in p̂.
   ProxyFault operator()(ProxyTrial<N>& trial, const models::Vec<N>& q_previous, double law_period_s) const noexcept {
     if (!trial.p_hat.allFinite()) return ProxyFault::result_not_finite;
     if (timed_) g_->set_time({time_s_, law_period_s});
@@ -92,7 +91,7 @@ class ProxySolver {
   double time_s_ = 0.0;
 };
 
-// One step of (26) under the force h, the last one being `past`. `period_s`: T.
+// One step of (26) under the force h, after the history `past`. period_s: T.
 template <int N>
 ProxyFault step_of_26(const ProxyRule& rule, const ProxyHistory<N>& past, const models::Vec<N>& h,
                       const models::Vec<N>& q_ref, double period_s, const ProxySolver<N>& solve,

@@ -1,13 +1,13 @@
-// Keeps the last ten seconds in memory: what came into the cycle, what left it, and the controller's state.
+// Keeps the last ten seconds of a session in memory: the cycle's input and output, and the controller's state.
 //
 // The cycle writes here (noexcept, no lock, no allocation, no system call; every page is touched beforehand). The
-// memory is a shared mapping, so that a process that was forked off before still has it when this one has died
-// (command_line/black_box_keeper.hpp), and a process that is given its descriptor can read it (MappedBox). Four rings,
+// memory is a shared mapping: a process forked earlier keeps it when this process dies
+// (command_line/black_box_keeper.hpp), and a process that gets the descriptor can read it (MappedBox). Four rings,
 // overwritten from their oldest end:
-//   cycles   one entry per cycle: what came in by other ways than frames, and the cycle's record
-//   frames   all that was received and sent, in order
-//   truths   of a simulation: where the tool truly is, which the cycle doesn't know; written beside it, for who watches
-//   states   the controller's whole state at the begin of a cycle, once a second: where a replay can start
+//   cycles   one entry per cycle: its input beside frames, and the cycle's record
+//   frames   all received and sent frames, in order
+//   truths   in simulation: the true pose of the tool, which the cycle doesn't know; written for viewers
+//   states   the controller's whole state at the beginning of a cycle, once a second, where a replay can start
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ inline constexpr std::size_t max_buses = 8;
 
 struct BoxFrame {
   fieldbus::CanFrame frame;
-  std::int64_t time_ns = 0;  // received: when it was on the wire; sent: when it was handed to the interface
+  std::int64_t time_ns = 0;  // received: time on the wire; sent: when it was handed to the interface
   std::uint8_t bus = 0;
   bool sent = false;
   fieldbus::SendResult result = fieldbus::SendResult::sent;
@@ -41,7 +41,6 @@ struct BusInput {
   std::uint64_t receive_overflows = 0;
 };
 
-// What one cycle was given, and its record.
 struct BoxCycle {
   std::int64_t t_k_ns = 0;
   std::uint64_t first_frame = 0;  // in the ring of frames, counted from the first cycle
@@ -58,7 +57,7 @@ struct BoxCycle {
   CycleRecord record;
 };
 
-// A simulated tool at a cycle's begin, in W.
+// The true pose of a simulated tool in W at the beginning of a cycle.
 struct BoxTruth {
   std::uint64_t cycle = 0;  // counted from the first one
   Triple tool_m{};
@@ -68,7 +67,7 @@ struct BoxTruth {
 static_assert(std::is_trivially_copyable_v<BoxCycle> && std::is_trivially_copyable_v<BoxFrame> &&
               std::is_trivially_copyable_v<BoxTruth>);
 
-// The cycle's side of it.
+// The interface for the cycle.
 class CycleBox {
  public:
   CycleBox() = default;
@@ -76,16 +75,16 @@ class CycleBox {
   CycleBox& operator=(const CycleBox&) = delete;
   virtual ~CycleBox() = default;
 
-  // The entry of the cycle that begins; all of it is for the caller to fill.
+  // Begins an entry; the caller fills all of it.
   [[nodiscard]] virtual BoxCycle& begin(std::int64_t t_k_ns) noexcept = 0;
   virtual void add(const BoxFrame& frame) noexcept = 0;
   virtual void finish() noexcept = 0;
-  // Room for a state where one is due, before the first frame of the cycle; empty: none is.
+  // Returns memory for a state if one is due, else an empty span. Called before the first frame of the cycle.
   [[nodiscard]] virtual std::span<std::byte> state_room() noexcept = 0;
   virtual void finish_state(std::size_t bytes) noexcept = 0;
 };
 
-// What any thread or process may read of a box while its cycle writes: whole cycles only.
+// Read access for any thread or process while the cycle writes: whole cycles only.
 class BoxReader {
  public:
   static constexpr std::size_t most_state_bytes = 16384;
@@ -94,18 +93,18 @@ class BoxReader {
   BoxReader& operator=(const BoxReader&) = delete;
 
   [[nodiscard]] std::uint64_t cycles() const noexcept { return head_->cycles.load(std::memory_order_acquire); }
-  // False where the cycle has been overwritten, which also happens while a reader in another thread copies it.
+  // Returns false if the cycle has been overwritten, also while copying.
   bool read(std::uint64_t cycle, BoxCycle& out, std::vector<BoxFrame>& frames) const;
   // The same without its frames.
   bool read(std::uint64_t cycle, BoxCycle& out) const noexcept;
   [[nodiscard]] std::uint64_t oldest_cycle() const noexcept;
-  // Up to which cycle the truth is told; 0: nobody tells it.
+  // Number of cycles with a true pose; 0: none is written.
   [[nodiscard]] std::uint64_t truths() const noexcept { return head_->truths.load(std::memory_order_acquire); }
-  // False where it isn't there (any more).
+  // Returns false if it isn't there, or not any more.
   bool truth(std::uint64_t cycle, BoxTruth& out) const noexcept;
-  // The oldest state from which all cycles are still there. False where there is none.
+  // Returns the oldest state from which all cycles are still there; false if there is none.
   bool oldest_state(std::uint64_t& cycle, std::vector<std::byte>& state) const;
-  // The frames of a cycle that was begun and never ended.
+  // The frames of a cycle that began and never ended.
   [[nodiscard]] std::vector<BoxFrame> unfinished() const;
 
  protected:
@@ -116,12 +115,12 @@ class BoxReader {
   };
   static constexpr std::size_t state_count = 16;
   struct Head {
-    std::uint64_t layout = 0;  // of the program that wrote it: layout_of_this_program()
+    std::uint64_t layout = 0;  // layout_of_this_program() of the program that wrote the box
     std::uint64_t cycle_capacity = 0, frame_capacity = 0;
     std::atomic<std::uint64_t> cycles{0}, frames{0}, states{0}, truths{0};
   };
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
-  // Another build may have other records.
+  // Another build may have records of another size.
   [[nodiscard]] static std::uint64_t layout_of_this_program() noexcept {
     return sizeof(BoxCycle) << 32U | sizeof(BoxFrame);
   }
@@ -132,7 +131,7 @@ class BoxReader {
     return sizeof(Head) + cycles * (sizeof(BoxCycle) + sizeof(BoxTruth)) + frames * sizeof(BoxFrame) +
            state_count * sizeof(State);
   }
-  // The rings within the memory that begins with `head`, which has the capacities.
+  // Sets the pointers to the rings behind `head`. Precondition: `head` holds the capacities.
   void lay_out(Head* head) noexcept;
 
   Head* head_ = nullptr;
@@ -147,11 +146,11 @@ class BlackBox final : public CycleBox, public BoxReader {
   static constexpr double seconds = 10.0;
 
   enum class Memory : std::uint8_t {
-    forked,         // for processes that are forked off
-    by_descriptor,  // for any process that is given descriptor(), too; counts against a limit of file sizes
+    forked,         // for forked processes
+    by_descriptor,  // also for any process that gets descriptor(); counts against a limit of file sizes
   };
 
-  // `frames_per_cycle`: the largest number that is expected.
+  // `frames_per_cycle`: the largest expected number.
   BlackBox(double period_s, std::size_t frames_per_cycle, Memory memory = Memory::forked);
   ~BlackBox() override;
 
@@ -160,10 +159,10 @@ class BlackBox final : public CycleBox, public BoxReader {
   void finish() noexcept override;
   [[nodiscard]] std::span<std::byte> state_room() noexcept override;
   void finish_state(std::size_t bytes) noexcept override;
-  // Of the newest cycle, by whoever simulates it, after the cycle.
+  // Adds the newest cycle's true pose; called by the simulation after the cycle.
   void add_truth(const Triple& tool_m, const std::array<double, 4>& tool_q) noexcept;
 
-  // Memory::by_descriptor: closed on exec, and with the box; else −1.
+  // With Memory::by_descriptor: closed on exec, and with the box; else −1.
   [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
 
  private:
@@ -172,10 +171,10 @@ class BlackBox final : public CycleBox, public BoxReader {
   int descriptor_ = -1;
 };
 
-// Another process's box, through its descriptor; the pages are mapped for reading alone.
+// Another process's box, mapped read-only through its descriptor.
 class MappedBox final : public BoxReader {
  public:
-  // Throws std::runtime_error for memory that isn't a box of this build of the program.
+  // Throws std::runtime_error if the memory isn't a box of this build of the program.
   explicit MappedBox(int descriptor);
   ~MappedBox();
 

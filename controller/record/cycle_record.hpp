@@ -1,5 +1,5 @@
-// What one cycle leaves behind: plain data of fixed size, pushed into a ring by the cycle, read by the summary, the
-// files and the plot outside of it.
+// The record of one cycle: plain data of fixed size. The cycle pushes it into a ring; summary, files and plot read it
+// outside the cycle.
 #pragma once
 
 #include <algorithm>
@@ -20,10 +20,10 @@ enum class ContactPhase : std::uint8_t { free, stick, slip };
 
 const char* contact_phase_name(ContactPhase phase) noexcept;
 
-// What was unusual in a cycle. An active limit is no fault.
+// Conditions out of the ordinary in a cycle. An active limit is no fault.
 enum class RecordFlag : std::uint32_t {
   sample_held = 1u << 0,       // no new sensor sample: the last force was used again
-  feedback_missing = 1u << 1,  // some drive's TPDO didn't come: its last position was used
+  feedback_missing = 1u << 1,  // some drive's TPDO is missing: its last position was used
   limit_speed = 1u << 2,
   limit_acceleration = 1u << 3,
   limit_workspace = 1u << 4,
@@ -31,8 +31,8 @@ enum class RecordFlag : std::uint32_t {
   limit_leash = 1u << 6,
   limit_orientation = 1u << 7,
   hands_off = 1u << 8,  // nobody holds the handle: the proxy comes to rest
-  truth = 1u << 9,      // the fields of the simulation's truth are filled in
-  overrun = 1u << 10,   // the cycle was late; wall-clock, so it goes to timing.json and not to signals.csv
+  truth = 1u << 9,      // the fields of the simulation's true state are filled in
+  overrun = 1u << 10,   // the cycle was late; depends on the wall clock, so it is in timing.json, not in signals.csv
   limit_power = 1u << 11,
   limit_keep_out = 1u << 12,
   limit_joint_speed = 1u << 13,
@@ -41,23 +41,23 @@ enum class RecordFlag : std::uint32_t {
   limit_following_error = 1u << 16,  // setpoints waited for a drive that doesn't follow
   limit_joint_torque = 1u << 17,     // impedance type: the rendered torques were cut
   oscillation = 1u << 18,            // motion above the hand's band (passivity.hpp)
-  timestep = 1u << 19,               // it is being changed: the arm stops for it, or stands
+  timestep = 1u << 19,               // timestep change in progress: the arm brakes or stands
   guard_speed = 1u << 20,            // the last guard changed the setpoints (tool_guard.hpp)
   guard_elbow = 1u << 21,
   guard_border = 1u << 22,
   guard_turning = 1u << 23,
-  ramp_in = 1u << 24,  // only a share of the hand's force was let in
+  ramp_in = 1u << 24,  // only a share of the hand's force is let in
   slowed = 1u << 25,   // the tool's speed limit is below the cell's, because of a fault
   oscillation_lasts = 1u << 26,
-  power_cut = 1u << 27,    // the drives are told to lose their power at once: a stop of category 0
+  power_cut = 1u << 27,    // stop of category 0: the drives are ordered to cut their power at once
   unresolved = 1u << 28,   // no solution was found that keeps all laws of contact
-  sample_late = 1u << 29,  // the sensor's sample is one that the cycle before had waited for
+  sample_late = 1u << 29,  // the sensor's sample belongs to the cycle before, which waited for it in vain
 };
 
-// As signals.csv has it.
+// Its name in signals.csv.
 const char* flag_name(RecordFlag flag) noexcept;
 
-// The flag of a limit, and the parameter that holds it ("limits.leash_m").
+// The flag of a limit, and the parameter of that limit ("limits.leash_m").
 struct LimitFlag {
   RecordFlag flag;
   Limit limit;
@@ -79,7 +79,7 @@ inline constexpr std::array limit_flags{LimitFlag{RecordFlag::limit_speed, Limit
                                         LimitFlag{RecordFlag::guard_border, Limit::guard_border},
                                         LimitFlag{RecordFlag::guard_turning, Limit::guard_turning}};
 
-// Three numbers that stay trivially copyable (Eigen's types aren't).
+// Three numbers; unlike Eigen's types trivially copyable.
 using Triple = std::array<double, 3>;
 
 inline Triple triple(const models::Vec3& v) noexcept { return {v.x(), v.y(), v.z()}; }
@@ -87,19 +87,19 @@ inline models::Vec3 vec3(const Triple& v) noexcept { return {v[0], v[1], v[2]}; 
 
 inline constexpr std::size_t max_axes = 8;
 
-// A place where an object presses on the proxy.
+// A contact of the proxy with an object.
 struct RecordedContact {
-  std::int32_t object = -1;  // by its index in the scene; below 0: no part of it, or there is no contact
-  std::int32_t part = -1;    // of a tool with a shape; −1: a point
+  std::int32_t object = -1;  // index in the scene; below 0: not in the scene, or no contact
+  std::int32_t part = -1;    // of a tool with a shape; −1: a point tool
   bool slips = false;
-  double friction = 0.0;  // μ, as it is now
+  double friction = 0.0;  // μ at present
   double gap_m = 0.0;     // between tool and object there
   Triple point_W_m{};     // the tool's material point
-  Triple normal_W{};      // unit, out of the object; zero: there is no contact
+  Triple normal_W{};      // unit, out of the object; zero: no contact
   Triple force_W_N{};     // on the tool
 };
-// So many are recorded: a box has four corners on a table, and eight in a groove. Of a tool the strongest come first;
-// of a point the order is the scene's.
+// Enough for a box on a table (four corners) or in a groove (eight). A tool's contacts are the strongest, strongest
+// first; a point's are in the scene's order.
 inline constexpr std::size_t most_contacts = 8;
 
 struct CycleRecord {
@@ -108,15 +108,15 @@ struct CycleRecord {
   std::int64_t period_ns = 0;  // T, from this cycle to the next one
   Phase phase = Phase::idle;
   ContactPhase contact = ContactPhase::free;
-  std::uint8_t contact_count = 0;  // how many things press at once, also beyond most_contacts
+  std::uint8_t contact_count = 0;  // number of simultaneous contacts, may exceed most_contacts
   std::uint8_t axes = 0;
-  ActiveLimits::Joints limited_joints{};  // held by limits of their own, as bits
+  ActiveLimits::Joints limited_joints{};  // as bits: joints held by their own limits
   std::uint32_t flags = 0;                // RecordFlag
 
-  // What the supervisor says: the fault that stopped the arm, and the one that it is held for; none where there is
-  // none, or where somebody asked for the hold.
+  // The supervisor's findings: the fault that stopped the arm, and the fault that it is held for. none: no fault, or a
+  // requested hold.
   Fault fault = Fault::none, held_for = Fault::none;
-  std::int32_t fault_where = -1;  // of the first of them that there is, as in FaultReport
+  std::int32_t fault_where = -1;  // of the first of these faults, as in FaultReport
   std::uint64_t fault_cycle = 0;
   double fault_value = 0.0, fault_limit = 0.0;
 
@@ -125,38 +125,39 @@ struct CycleRecord {
   Triple p_hat_W_m{};                 // (26a)
   Triple proxy_W_m{};                 // q(k)
   Triple contact_force_W_N{};         // f(k), (25a): on the proxy
-  // A point's have no place and no force until place_contacts() (signals/point_contacts.hpp).
+  // A point's contacts have no place and force until place_contacts() (signals/point_contacts.hpp).
   std::array<RecordedContact, most_contacts> contacts{};
   Triple tool_W_m{};               // the rendered point by the encoders, at t_k
   double proxy_clearance_m = 0.0;  // signed distance of the proxy to the nearest surface; below 0: inside
-  double tool_clearance_m = 0.0;   // of the tool: by the truth where there is one, else by the encoders
+  double tool_clearance_m = 0.0;   // of the tool, in simulation by its true place, else by the encoders
   std::array<std::int32_t, max_axes> target_counts{};  // 607A sent in this cycle; in torque mode 6071
   std::array<std::int32_t, max_axes> actual_counts{};  // 6064, sampled at this cycle's SYNC
 
   double proxy_mass_kg = 0.0, proxy_damping_Ns_per_m = 0.0;  // M and B of this step; impedance type: 0
-  double tool_mass_kg = 0.0;  // of the tool behind the sensor, which is felt beside the proxy's; 0: not told
+  double tool_mass_kg = 0.0;  // of the tool behind the sensor, felt in addition to the proxy's; 0: not recorded
 
   std::array<double, 4> proxy_q_W{0.0, 0.0, 0.0, 1.0};  // the proxy's orientation: x y z w
   Triple contact_torque_W_Nm{};                         // of the contacts on the proxy, about the rendered point
   double proxy_inertia_kg_m2 = 0.0;                     // J of this step, felt; 0: the orientation is held
   double proxy_turning_damping_Nms_per_rad = 0.0;       // of this step
 
-  // Of PassivityObserver, where it is wanted.
+  // From PassivityObserver, if it observes.
   PortEnergies energies_J{};
-  Triple links_W_m{}, links_W_rad{};  // of a tool that turns: by its links, since rendering began
-  double limits_work_J = 0.0;         // of the limits on the proxy since rendering began (limits_work.hpp)
+  Triple links_W_m{}, links_W_rad{};  // for a tool that turns: displacement and rotation by the links, since rendering
+                                      // began
+  double limits_work_J = 0.0;         // work of the limits on the proxy since rendering began (limits_work.hpp)
   double added_damping_Ns_per_m = 0.0, felt_damping_Ns_per_m = 0.0, oscillation_m_per_s = 0.0;
 
-  std::int64_t refused_period_ns = 0;          // a timestep that was given up in this cycle; 0: none
-  fieldbus::PeriodRefusal timestep_refusal{};  // by whom
+  std::int64_t refused_period_ns = 0;          // a timestep refused in this cycle; 0: none
+  fieldbus::PeriodRefusal timestep_refusal{};  // who refused it, and why
 
-  // The simulation's truth at t_k (flag `truth`).
+  // The simulation's true state at t_k (flag `truth`).
   Triple true_tool_W_m{};
   Triple hand_force_W_N{}, hand_torque_W_Nm{};              // of the hand on the tool, about the rendered point
-  std::array<double, 4> true_tool_q_W{0.0, 0.0, 0.0, 1.0};  // its orientation: x y z w
+  std::array<double, 4> true_tool_q_W{0.0, 0.0, 0.0, 1.0};  // the tool's orientation: x y z w
   Triple true_acceleration_W_m_per_s2{};
 
-  std::int64_t compute_ns = 0;  // wall-clock of the whole cycle, waiting apart; goes to timing.json alone
+  std::int64_t compute_ns = 0;  // wall-clock time of the whole cycle without waiting; only for timing.json
 
   [[nodiscard]] std::size_t recorded_contacts() const noexcept {
     return std::min<std::size_t>(contact_count, most_contacts);

@@ -1,4 +1,4 @@
-// What a cycle's flags mean, in words: for the summary of a session and for whoever looks at it.
+// The meaning of a cycle's flags in words, for a session's summary and its viewers.
 #pragma once
 
 #include <vector>
@@ -7,14 +7,13 @@
 
 namespace proxarm::controller {
 
-// What holds the arm back, or is otherwise out of the ordinary, while a flag is set.
+// What holds the arm back or is out of the ordinary while a flag is set.
 struct FlagWords {
   RecordFlag flag;
   const char* words;
-  bool holds_back;  // it is a limit that acts
+  bool holds_back;  // an active limit
 };
 [[nodiscard]] const std::vector<FlagWords>& flag_words();
-// Of one of them.
 [[nodiscard]] const char* words_of(RecordFlag flag) noexcept;
 
 }  // namespace proxarm::controller

@@ -1,8 +1,7 @@
-// Passes another network's traffic through unchanged, and leaves a copy of every frame in a ring.
+// Passes another network's traffic through unchanged, and copies every frame to a ring.
 //
-// For records of runs on real interfaces, where nothing else sees all frames. Sent frames carry the time of send(), or
-// the one that send_all() is told: in the log they are earlier than on the wire, by their time in the interface's queue
-// and on the bus.
+// For records on real interfaces, where nothing else sees all frames. Sent frames have the time of send(), or the time
+// given to send_all(): earlier than on the wire, by the wait in the interface's queue and on the bus.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +21,7 @@ struct TappedFrame {
 
 class FrameTap final : public fieldbus::CanNetwork {
  public:
-  // `network` must outlive the tap.
+  // Precondition: `network` outlives the tap.
   FrameTap(fieldbus::CanNetwork& network, std::size_t capacity);
   ~FrameTap() override;
 

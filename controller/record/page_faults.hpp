@@ -1,5 +1,5 @@
-// How often the kernel had to give the calling thread a page of memory. Each costs a microsecond (minor) or, from a
-// disk, milliseconds (major), so a cycle that is to be in time must have none. Locked memory (mlockall) has none.
+// Counts the calling thread's page faults. Each costs a microsecond (minor) or, from a disk, milliseconds (major), so a
+// cycle on time must have none. Locked memory (mlockall) has none.
 #pragma once
 
 #include <sys/resource.h>
@@ -16,7 +16,7 @@ struct PageFaults {
   }
 };
 
-// The counts of the calling thread so far. This is a system call.
+// A system call.
 inline PageFaults thread_page_faults() noexcept {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);

@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using description::SetupError;
 
-// An upper bound of what a file may claim, far above what a cycle gets: a period of 100 ms on eight buses at 1 Mbit/s.
+// Upper bound for counts in a file, far above a real cycle: a period of 100 ms on eight buses at 1 Mbit/s.
 constexpr std::uint32_t most_frames_per_cycle = 16384;
 constexpr std::size_t most_entry_bytes = most_frames_per_cycle * 96 + 4096;
 constexpr std::size_t block_bytes = 1 << 18;
@@ -40,7 +40,7 @@ void archive(fieldbus::StateArchive& state, ReplayHead& head) noexcept {
         head.first_cycle);
 }
 
-// False where the counts are out of range.
+// Returns false if the counts are out of range.
 bool archive(fieldbus::StateArchive& state, BoxFrame& frame, std::uint32_t buses) noexcept {
   fieldbus::CanFrame& f = frame.frame;
   state(frame.time_ns, frame.bus, frame.sent, frame.result, f.id, f.extended, f.remote, f.error, f.fd,
@@ -193,7 +193,7 @@ void ReplayReader::refuse(const std::string& found) const {
                     .advice = "give the folder of a session (--record) or of a black box"});
 }
 
-// False where the entry isn't whole.
+// Returns false if the entry is incomplete.
 bool ReplayReader::read_entry() {
   std::uint32_t bytes = 0;
   file_.read(reinterpret_cast<char*>(&bytes), sizeof bytes);
@@ -230,7 +230,7 @@ ReplayReader::ReplayReader(const fs::path& file) : name_(file) {
   block_begins_ = block_ends_ = file_.tellg();
 }
 
-// False at the end of the file, which is also before a block that isn't whole.
+// Returns false at the end of the file or before an incomplete block.
 bool ReplayReader::read_block() {
   block_begins_ = block_ends_;
   at_ = 0;
@@ -254,7 +254,6 @@ bool ReplayReader::read_block() {
   return true;
 }
 
-// Of the next cycle; false where there is none.
 bool ReplayReader::read_cycle() {
   if (at_ == block_.size() && !read_block()) return false;
   std::uint32_t bytes = 0;
@@ -300,7 +299,7 @@ class ReplayNetwork::Bus final : public fieldbus::CanBus {
   fieldbus::SendResult send(const fieldbus::CanFrame&) noexcept override {
     return next_ < results_.size() ? results_[next_++] : fieldbus::SendResult::sent;
   }
-  // The next frame, if it came on this bus. The order among buses is kept, too.
+  // Returns the next frame if it came on this bus, which keeps the order among buses.
   bool receive(fieldbus::TimedFrame& out) noexcept override {
     if (network_.next_ >= network_.received_.size()) return false;
     const BoxFrame& frame = network_.received_[network_.next_];

@@ -1,7 +1,7 @@
-// One number for everything that was commanded: the SHA-256 of all setpoints, as int32 little-endian counts in axis
-// order, cycle after cycle. Two runs that command the same have the same hash.
+// SHA-256 of all setpoints, as int32 little-endian counts in axis order, cycle after cycle. Runs with the same
+// setpoints have the same hash.
 //
-// Not for the cycle itself: whoever drains the records feeds it.
+// Not for the cycle; the reader of the records feeds it.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@ namespace proxarm::controller {
 
 class SetpointHash {
  public:
-  // Throws std::runtime_error where OpenSSL doesn't compute SHA-256.
+  // Throws std::runtime_error if OpenSSL can't compute SHA-256.
   SetpointHash();
 
   void add(std::span<const std::int32_t> counts);
-  // 64 lower-case hexadecimal digits, of what has been added so far; adding may go on.
+  // 64 lower-case hexadecimal digits, over all counts so far; more may be added.
   [[nodiscard]] std::string hex() const;
 
  private:

@@ -15,16 +15,16 @@ using models::Vec3;
 
 namespace {
 
-// The shares of the speed limits that the proxy keeps to. A hand that pushes 50 N at once on the 0.5 kg of a light
-// device is faster than the proxy by some tenths of m/s for 20 ms, until K and B have answered.
+// Shares of the speed limits for the proxy. A hand that suddenly pushes 50 N on the 0.5 kg of a light device is faster
+// than the proxy by some tenths of m/s for 20 ms, until K and B have responded.
 constexpr double joint_speed_share = 0.75, tool_speed_share = 0.4;
-// The share of a joint's acceleration by which the proxy brakes. A hand's mass of 1 kg triples what the elbow of a
-// light device brakes, and the hand may go on pushing with most of what the drive has.
+// Share of a joint's acceleration for braking the proxy. A hand's mass of 1 kg triples the inertia at the elbow of a
+// light device, and the hand may keep pushing with most of the drive's torque.
 constexpr double braking_share = 0.2;
-// The ball |J u| ≤ vT is cut by tangent planes, each at the point that the ones before led to. Each cut leaves the
-// square of the angle of the one before: after six, rounding. What is left is taken off by scaling.
+// Tangent planes approximate the ball |J u| ≤ vT, each at the solution with those before. Each cut squares the angle
+// that is left: after six, only rounding remains, which scaling removes.
 constexpr int most_cuts = 6;
-// Of a bound: below it, a difference is the program's rounding.
+// Share of a bound: smaller differences are the program's rounding.
 constexpr double rounding = 1e-9;
 
 }  // namespace
@@ -80,7 +80,7 @@ const JointVector& JointCoupling::step(const JointVector& link_rad, const Jacobi
   return torque_Nm_;
 }
 
-// Those of the last steps_.
+// Means over the last steps_.
 void JointCoupling::take_mean() noexcept {
   torque_Nm_.setZero();
   released_N_ = 0.0;
@@ -106,7 +106,7 @@ JointCoupling::Box JointCoupling::box(const JointMatrix& M) const noexcept {
   return box;
 }
 
-// The row of the release bears `price` at most: then it is out of the program, and all of it has been paid.
+// The release's row has a multiplier of at most `price`; at that price the row leaves the program and is fully paid.
 JointVector JointCoupling::nearest(const JointVector& u_hat, const JointMatrix& M, const Jacobian& J_W, const Box& box,
                                    const Bounds& bounds, double price, double& paid) noexcept {
   const JointVector still = JointVector::Zero(u_hat.size());
@@ -145,7 +145,7 @@ JointVector JointCoupling::cut(const Jacobian& J_W, double tool_step_m) noexcept
   }
 }
 
-// A joint's bound is active where the step lies on it.
+// A joint's bound is active if the step reaches it.
 void JointCoupling::note_active(const JointVector& u, const Box& box) noexcept {
   for (std::size_t i = 0; i < joints_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);

@@ -1,41 +1,41 @@
-// The steps that a device with torques may make, as sets of its joints: (23) of Kikuuwe and Fujimoto (World Haptics
-// 2007) in joint space. A joint's end, a joint's speed, the tool's speed, an empty handle and a coupling that is let go
-// are one law.
+// The limits of a device with torques, as sets of joint steps: (23) of Kikuuwe and Fujimoto (World Haptics 2007) in
+// joint space. One law covers joint ranges, joint speeds, the tool's speed, an empty handle and the release of a
+// coupling.
 //
-// φ(k): the links' angles as measured; c(k): the joints' proxy, which keeps to the sets; φ₁, c₁: those of k − 1; M(φ):
-// the mass matrix with rotors; J: the Jacobian of T's translation. The force of (23) becomes a torque, its 𝒢 is (2):
+// φ(k): measured link angles; c(k): the joints' proxy, which keeps to the sets; φ₁, c₁: those of k − 1; M(φ): mass
+// matrix with rotors; J: Jacobian of T's translation. The force of (23) becomes a torque, its 𝒢 is (2):
 //   φ̂(k) = φ + B(c₁ − φ₁)/(KT + B)                                      (23a)
 //   c(k) = argmin ½(c − φ̂)ᵀ M (c − φ̂)   where   c − c₁ ∈ U               (23b), (2)
 //   τ(k) = mean over 5 ms of (K + B/T)(c − φ̂),   K = γ M/t², B = β M/t    (23c)
-// t: the longer of T and 1 ms. U, with a share of each limit, since a hand leads the steel beyond the proxy at first:
+// t: the longer of T and 1 ms. U uses a share of each limit, since a hand first moves the arm beyond the proxy:
 //   −T min(v, C(c₁ − c_min)) ≤ c − c₁ ≤ T min(v, C(c_max − c₁))   v = 3/4 max_speed_rad_per_s
 //   |J (c − c₁)| ≤ T v_tool                                       v_tool = 2/5 max_tool_speed_m_per_s, or less
-// C(d): the approach from which braking by a fifth of max_acceleration_rad_per_s2 ends within d (limits/braking.hpp).
-// c_min, c_max: short of range_rad by what the drive's whole torque presses a joint into its end, τ_max t²/(γ m_i),
-// with m_i = 1/(M⁻¹)_ii. A joint that starts beyond isn't driven back; it moves inwards only. With v_tool = 0 the
-// joints are held where c is.
+// C(d): speed from which braking with a fifth of max_acceleration_rad_per_s2 ends within d (limits/braking.hpp). c_min,
+// c_max: range_rad, less the distance by which the drive's full torque presses a joint into its end, τ_max t²/(γ m_i),
+// m_i = 1/(M⁻¹)_ii. A joint that starts beyond isn't driven back; it can only move inwards. With v_tool = 0 the joints
+// are held at c.
 //
 // - At rest a torque τ_h presses a joint by τ_h t²/(γ m_i) into its end: 14 mrad for 15 Nm on the elbow of
 //   models/cells/light.yaml, within its range.
-// - Inside of the sets c = φ̂, and the torque is 0, not small.
-// - A wall's torque acts on its own joint: M(c − φ̂) = −Σ λ_i n_i with the rows n_i of U that are active.
+// - Inside the sets c = φ̂, and the torque is exactly 0.
+// - A limit's torque acts on its own joint: M(c − φ̂) = −Σ λ_i n_i, n_i: active rows of U.
 // - U is convex and contains 0, so (c − c₁)ᵀτ ≤ 0 before the mean: no torque of U drives the joints' proxy.
 //
-// Where a drive has not that much torque, the proxy yields: with the share s that was given, c(k) = φ̂ + s (c − φ̂), out
-// of its sets (Kikuuwe, IEEE Trans. Robotics 35:5, 2019, has the set-valued form). So nothing winds up: a hand that has
-// overpowered a joint and lets go isn't pulled back to where it was held.
+// If a drive can give only the share s of the torque, the proxy yields: c(k) = φ̂ + s (c − φ̂), outside the sets
+// (set-valued form: Kikuuwe, IEEE Trans. Robotics 35:5, 2019). So nothing winds up: a hand that has overpowered a joint
+// and lets go isn't pulled back.
 //
-// A force f that the world renders may let go of the tool no faster than U's last row says (Release), and what keeps it
-// takes from f alone: its multiplier is at most |f|. 25 N in 750 N/m hold 0.4 J, which would throw 0.5 kg at 1.3 m/s.
+// A rendered force f may release the tool only as fast as Bounds allows. The torque that prevents more is subtracted
+// from f: its multiplier is at most |f|. 25 N at 750 N/m store 0.4 J, which would throw 0.5 kg at 1.3 m/s.
 //
-// Stability. M is the metric, so the loop with rigid gears has no pose in it. With the true mass matrix M_t, and
-// M_t x = r M x in each mode x (M_t is M and what the hand adds, so r ≥ 1), it is that of K = γ/t², B = β/t on a mass r
-// (torque_rendering.hpp), late by the mean; fewer active rows make K and B smaller in that order of matrices. But a
-// gear swings: above its resonance the rotor alone answers, and a torque that is late by 1.5 T feeds what swings faster
-// than 120 Hz. The mean over 5 ms has its zero at 200 Hz and turns the sign beyond. joint_coupling_test.cpp has the
-// spectral radii: below 1 for rigid gears, r from 0.7 on and periods of 0.5 to 4 ms, and at 1 ms for the gears of
-// models/cells/light.yaml in simulation: 200 Hz against links of 0.034 kg m² and more, on rotors of 0.06. A gear that
-// swings between 70 and 180 Hz isn't borne.
+// Stability. M is the metric, so with rigid gears the loop doesn't depend on the pose. Let M_t be the true mass matrix
+// (M plus the hand's mass) and M_t x = r M x in each mode x, so r ≥ 1. Then the loop is K = γ/t², B = β/t on a mass r
+// (torque_rendering.hpp), delayed by the mean; with fewer active rows, K and B are smaller matrices. But above a gear's
+// resonance only the rotor responds, and a torque delayed by 1.5 T drives vibrations above 120 Hz. The mean over 5 ms
+// has its zero at 200 Hz and reverses the sign beyond. joint_coupling_test.cpp has the spectral radii: below 1 for
+// rigid gears, r from 0.7 on and periods of 0.5 to 4 ms; and at 1 ms for the simulated gears of
+// models/cells/light.yaml: 200 Hz with links of 0.034 kg m² and more, rotors of 0.06. Gears that swing between 70 and
+// 180 Hz make the loop unstable.
 #pragma once
 
 #include <array>
@@ -52,12 +52,12 @@ namespace proxarm::controller {
 class JointCoupling {
  public:
   static constexpr double stiffness_share = 0.012, damping_share = 0.15;  // γ, β
-  static constexpr double mean_s = 5e-3, shortest_s = 1e-3;               // of (23c), and t
+  static constexpr double mean_s = 5e-3, shortest_s = 1e-3;               // of (23c), and lower bound of t
 
-  // What one step may be beside the joints' and the cell's own limits.
+  // Bounds of one step in addition to the joints' and the cell's limits.
   struct Bounds {
     double tool_speed_m_per_s = std::numeric_limits<double>::infinity();
-    // Release: n·J (c − c₁) ≤ step_m, at the price of force_N.
+    // Release: n·J (c − c₁) ≤ step_m, with a force of at most force_N.
     models::Vec3 n_W = models::Vec3::Zero();
     double step_m = 0.0, force_N = 0.0;
   };
@@ -66,21 +66,21 @@ class JointCoupling {
   JointCoupling(const models::Arm& arm, const std::vector<description::DriveDescription>& drives,
                 const description::CellLimits& limits, double period_s);
 
-  // The joints' proxy is at rest at these angles.
+  // Starts the joints' proxy at rest at these angles.
   void start(const models::JointVector& link_rad) noexcept;
-  // One period. Returns τ(k) without what the release takes; 0 for angles that aren't finite, which change nothing. For
-  // the cycle: neither allocates, locks nor throws.
+  // One period. Returns τ(k) without the torque of the release. Angles that aren't finite give 0 and change nothing.
+  // May be called in the cycle: neither allocates, locks nor throws.
   const models::JointVector& step(const models::JointVector& link_rad, const models::Jacobian& J_W,
                                   const Bounds& bounds) noexcept;
 
-  // Tells that only this share of τ(k) was given: c(k) becomes φ̂ + s (c − φ̂).
+  // The drives gave only this share of τ(k): c(k) becomes φ̂ + s (c − φ̂).
   void yield(double share) noexcept { c_k1_ = c_hat_ + share * (c_k1_ - c_hat_); }
 
-  // What the release takes from the force, ≥ 0.
+  // The release subtracts this from the force, ≥ 0.
   [[nodiscard]] double released_N() const noexcept { return released_N_; }
-  // What the last step kept to. None while the joints are held.
+  // Limits active in the last step; empty while the joints are held.
   [[nodiscard]] const ActiveLimits& active() const noexcept { return active_; }
-  // How many steps the mean of (23c) is over.
+  // Number of steps in the mean of (23c).
   [[nodiscard]] static std::size_t mean_steps(double period_s) noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -102,7 +102,7 @@ class JointCoupling {
   };
 
   [[nodiscard]] Box box(const models::JointMatrix& M) const noexcept;
-  // u(k) = c − c₁ for û = φ̂ − c₁. `price`: of the release, in units of Mu.
+  // u(k) = c − c₁ for û = φ̂ − c₁. `price`: largest multiplier of the release, in units of Mu; `paid`: the one used.
   [[nodiscard]] models::JointVector nearest(const models::JointVector& u_hat, const models::JointMatrix& M,
                                             const models::Jacobian& J_W, const Box& box, const Bounds& bounds,
                                             double price, double& paid) noexcept;

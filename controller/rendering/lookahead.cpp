@@ -9,7 +9,7 @@ using models::Vec3;
 
 namespace {
 
-// H/T is a quotient of decimal numbers; if rounding puts it just below a whole number, that number is meant.
+// H/T is a quotient of decimal numbers; a value just below a whole number by rounding counts as that number.
 constexpr double rounding_steps = 1e-9;
 
 }  // namespace
@@ -47,7 +47,7 @@ auto Lookahead<N>::operator()(const AdmittanceProxy<N>& proxy, const SceneChange
   return rest > 0.0 ? V(before + rest * (proxy_.q() - before)) : proxy_.q();
 }
 
-// Collects the limits within reach. The bound of a border's plane falls by its share of the way towards it.
+// Collects the limits within reach. The bound of a border's plane falls by plane.share of the way towards it.
 template <int N>
 void Lookahead<N>::gather_limits(const StepLimits& limits, double reach_m) noexcept {
   ahead_.soft_count = ahead_.hard_count = ahead_.plane_count = 0;

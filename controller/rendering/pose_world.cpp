@@ -14,15 +14,15 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-// How fast the spring's reference returns to where the tool started, after the spring has become stiffer and after a
-// hold: slowly enough to be led by hand.
+// Return speed of the spring's reference to the tool's start, after the spring became stiffer and after a hold: slow
+// enough for a hand to follow.
 constexpr double reference_m_per_s = 0.05, reference_rad_per_s = TurnSets::returning_rad_per_s;
-// A tool that starts in touch with something is outside to rounding: some metres in double precision.
+// A tool that starts in contact is outside to rounding: of some metres in double precision.
 constexpr double rounding_m = 1e-12;
-// After a hold in contact the arm stands some micrometres inside of what the tool touches, by the twist of its gears;
-// so much is led out of it.
+// After a hold in contact, the twisted gears put the tool some micrometres inside the object. Up to this much is
+// corrected.
 constexpr double settled_m = 1e-3, settled_rad = 0.01;
-// Of the limits of rotation, which a wall holds to 1e-7 rad against 10 Nm.
+// Tolerance of the rotation limits; a wall holds to 1e-7 rad against 10 Nm.
 constexpr double yields_rad = 1e-6;
 constexpr int most_walls = 3;
 
@@ -51,7 +51,7 @@ void PoseWorld::turn_to(const Eigen::Quaterniond& R_WT, const Vec3& omega_W) noe
 void PoseWorld::start(const Vec3& q_W) noexcept {
   const ToolPose wanted{q_W, R_WT_};
   const ToolPose q = started_ ? outside(wanted) : wanted;
-  // After a hold the scene goes on from where it stopped.
+  // After a hold the scene continues from the time at which it stopped.
   proxy_.start(q, started_ ? proxy_.time_s() : 0.0);
   if (!started_) home_ = q;
   started_ = true;
@@ -60,8 +60,8 @@ void PoseWorld::start(const Vec3& q_W) noexcept {
   last_.q_W = last_.p_hat_W = q.position;
 }
 
-// The pose next to a wanted one that is outside of everything, if there is one: on the way from the last one, which
-// was.
+// The pose outside all objects next to the wanted one, if there is one: on the way from the last pose, which was
+// outside.
 ToolPose PoseWorld::outside(const ToolPose& wanted) noexcept {
   if (g_->clearance_m(wanted) >= -rounding_m) return wanted;
   const ToolPose reached = g_->step(proxy_.K(), wanted, proxy_.q());
@@ -69,7 +69,7 @@ ToolPose PoseWorld::outside(const ToolPose& wanted) noexcept {
   return off.head<3>().norm() <= settled_m && off.tail<3>().norm() <= settled_rad ? reached : wanted;
 }
 
-// One step of 𝒢 from the last pose goes as far towards the wanted one as the scene allows, and through nothing.
+// One step of 𝒢 from the last pose goes as far towards the wanted pose as the scene allows, and through no object.
 Vec3 PoseWorld::resume(const Vec3& q_W, const Vec3& v_W) noexcept {
   const ToolPose wanted{q_W, R_WT_};
   if (!q_W.allFinite() || !v_W.allFinite() || !R_WT_.coeffs().allFinite() || !omega_W_.allFinite()) return last_.q_W;
@@ -139,7 +139,7 @@ void PoseWorld::hold_rotation(const ToolPose& p_hat) noexcept {
     last_.fault = proxy_.again(K, models::moved(p_hat, models::solve_square<6>(K, pull)));
     if (last_.fault != ProxyFault::none) return;
   }
-  // K (q ⊟ p̂) is what contacts and walls exert together.
+  // K (q ⊟ p̂) is the wrench of contacts and walls together.
   if (walls > 0) walls_ = proxy_.K() * models::difference(proxy_.q(), p_hat) - proxy_.wrench_W();
 }
 
@@ -152,7 +152,7 @@ void PoseWorld::return_reference() noexcept {
   proxy_.set_reference(step == way ? home_ : models::moved(proxy_.reference(), step));
 }
 
-// The force of the limits on the proxy is what holds p̂ back.
+// The limits' force on the proxy is the one that holds p̂ back.
 void PoseWorld::report(const ToolPose& p_hat, const ToolPose& limited) noexcept {
   last_ = {};
   last_.q_W = proxy_.q().position;
@@ -171,7 +171,7 @@ void PoseWorld::report(const ToolPose& p_hat, const ToolPose& limited) noexcept 
   report_contacts();
 }
 
-// Keeps the strongest, the strongest first; what touches without a force doesn't count.
+// Keeps the strongest contacts, strongest first. Contacts without force don't count.
 void PoseWorld::report_contacts() noexcept {
   auto end = touches_.begin();
   for (const models::PoseContact& contact : g_->contacts()) {
@@ -231,7 +231,7 @@ void PoseWorld::hang(double proxy_mass_kg, const models::ToolInertia& behind) no
   proxy_.set(changed);
 }
 
-// K'e' = Ke keeps the force when K becomes K'. A spring that becomes softer throws nobody, so its reference stays.
+// K'e' = Ke keeps the force when K becomes K'. A softer spring makes no jump that could hurt, so its reference stays.
 void PoseWorld::set_springs(PoseConfig changed) noexcept {
   const PoseConfig before = proxy_.config();
   if (!proxy_.set(changed)) return;

@@ -1,20 +1,20 @@
-// A rigid tool and its scene as the cycle sees them: a wrench goes in, the tool's next pose comes out.
+// A rigid tool and its scene as the cycle sees them: wrench in, next pose of the tool out.
 //
-// The tool's place goes through RenderedWorld, as that of a point does. What turns is beside it: set_torque_W() before
+// RenderedWorld's functions handle the tool's position, as for a point. Orientation has its own: set_torque_W() before
 // a step, orientation() after it, turn_to() before start() and resume().
 //
-// Limits act on p̂, before 𝒢: its place is projected onto the step's sets (step_limits.hpp), and its rotation onto those
-// of speed, of the angle from the orientation at the first start and of tilt and twist. A contact may turn the tool on,
-// as a lever does that something pushes at its end. Where q comes to be beyond those sets of rotation by more than 1
-// µrad the step is taken again with them as walls. With n the axis about which q is turned back into them,
+// Limits act on p̂, before 𝒢: its position is projected onto the step's sets (step_limits.hpp), its rotation onto those
+// of turning speed, angle from the orientation at the first start, tilt and twist. A contact may still turn the tool
+// further, like a lever that is pushed at its end. If q leaves the rotation sets by more than 1 µrad, the step is
+// repeated with these sets as walls. With n the axis about which q turns back into the sets,
 //   ½‖q ⊟ p̂‖²_K + ½ s (nᵀ(q ⊟ p̂)_θ − c)²
-// has c of the set's border, and s as stiff as an orientation is held, 1e4 (5 cm)² K_xx: it yields by 1e-7 rad to 10
-// Nm. That is 𝒢 with K + s n nᵀ, for p̂ ⊞ (K + s n nᵀ)⁻¹ s c n. Up to three walls, as each step may come to be beyond
-// others. Where q(k−1) is beyond already, as after a hold, a wall leads back by 1 µrad a step, which is 100 Nm against
-// what holds the tool there; what leads back faster is p̂.
+// c is at the set's border, and s is the stiffness of a held orientation, 1e4 (5 cm)² K_xx: the wall yields by 1e-7 rad
+// to 10 Nm. This is 𝒢 with K + s n nᵀ, for p̂ ⊞ (K + s n nᵀ)⁻¹ s c n. There may be up to three walls, since each
+// repetition may leave other sets. If q(k−1) is already outside, as after a hold, a wall turns it back by 1 µrad per
+// step, which is 100 Nm against the contact that holds the tool there; p̂ does the faster return.
 //
-// Among objects that move a step can't be taken again: there, and for the place, q keeps the limits as long as contacts
-// lead nearer to q(k−1). The guards of the setpoints have the last word, as always (docs/tool.md).
+// Among moving objects a step can't be repeated. There, and for the position, q keeps the limits only as far as
+// contacts bring it nearer to q(k−1). The guards of the setpoints have the last word (docs/tool.md).
 #pragma once
 
 #include <memory>
@@ -37,18 +37,18 @@ struct PoseWorldConfig {
 
 class PoseWorld final : public RenderedWorld {
  public:
-  // Precondition: the scene outlives this object, and 𝒢 is that of its tool (scenes/rigid/compile_rigid.hpp).
+  // Precondition: the scene outlives this object, and `g` is its tool's 𝒢 (scenes/rigid/compile_rigid.hpp).
   PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, scenes::CompiledScene& scene, const PoseWorldConfig& config);
 
-  // The hand's torque about the rendered point, for the next step.
+  // The hand's torque about the rendered point in the next step.
   void set_torque_W(const models::Vec3& torque_W) noexcept { torque_W_ = torque_W; }
-  // For the next start() or resume(): the tool's orientation and angular velocity there.
+  // For the next start() or resume(): the tool's orientation and angular velocity.
   void turn_to(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W) noexcept;
-  // A share of the speed limit of turning, from 0 to 1.
+  // Share of the turning speed limit, 0 to 1.
   void limit_turning(double share) noexcept { speed_share_ = share; }
-  // As add_damping(), of turning.
+  // Like add_damping(), for turning.
   void add_turning_damping(double damping_Nms_per_rad) noexcept;
-  [[nodiscard]] const PoseConfig& config() const noexcept { return proxy_.config(); }  // with what was added
+  [[nodiscard]] const PoseConfig& config() const noexcept { return proxy_.config(); }  // includes added damping
   [[nodiscard]] double own_turning_damping_Nms_per_rad() const noexcept { return turning_damping_Nms_per_rad_; }
   [[nodiscard]] double kinetic_J() const noexcept { return proxy_.kinetic_J(); }
   [[nodiscard]] const Eigen::Quaterniond& orientation() const noexcept { return proxy_.q().orientation; }
@@ -56,7 +56,7 @@ class PoseWorld final : public RenderedWorld {
     return proxy_.move().tail<3>() / proxy_.config().period_s;
   }
   [[nodiscard]] bool turning_limited() const noexcept { return turning_limited_; }  // in the last step
-  // The sets of turning in the next step.
+  // Sets of turning for the next step.
   [[nodiscard]] TurnSets sets() const noexcept;
 
   void start(const models::Vec3& q_W) noexcept override;
@@ -67,7 +67,7 @@ class PoseWorld final : public RenderedWorld {
   }
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept override;
   void set(const Change& change) noexcept override;
-  // As RenderedTool has it. What would make the proxy's mass indefinite changes nothing.
+  // See RenderedTool. A value that would make the proxy's mass indefinite changes nothing.
   void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept;
   void set_period(double period_s) noexcept override {
     changes_.set_period(period_s);
@@ -92,15 +92,15 @@ class PoseWorld final : public RenderedWorld {
   LimitedAlgorithm<3> limits_;
   PoseProxy proxy_;
   Touches touches_;
-  WorldStep last_;                               // its touches are among these
-  models::Twist walls_ = models::Twist::Zero();  // what the limits of rotation exerted in the last step, beside p̂
+  WorldStep last_;                               // its touches are stored in touches_
+  models::Twist walls_ = models::Twist::Zero();  // wrench of the rotation walls in the last step
   models::Vec3 torque_W_ = models::Vec3::Zero(), omega_W_ = models::Vec3::Zero();
   Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();  // for start() and resume()
   models::ToolPose home_;                                     // of the first start
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0, speed_share_ = 1.0;
   double turning_damping_Nms_per_rad_, added_Nms_per_rad_ = 0.0;
   bool started_ = false, turning_limited_ = false;
-  bool no_room_ = false;  // the tool was to start inside of something
+  bool no_room_ = false;  // the tool's start pose is inside an object
 };
 
 }  // namespace proxarm::controller

@@ -1,8 +1,8 @@
-// The tool's proxy as the motion sees it, place and orientation together: a wrench goes in, the next pose comes out.
+// The tool's proxy as the motion sees it, position and orientation: wrench in, next pose out.
 //
-// A point turns beside its world, with an inertia of its own (orientation_proxy.hpp); a tool with a shape turns in its
-// world's step (pose_world.hpp). Who moves either need not know which it is. One caller at a time; nothing here
-// allocates, locks or throws after construction.
+// A point tool turns independently of its world, with its own inertia (orientation_proxy.hpp); a shaped tool turns in
+// its world's step (pose_world.hpp). Callers needn't know which. One caller at a time. No allocation, lock or throw
+// after construction.
 #pragma once
 
 #include <memory>
@@ -23,47 +23,46 @@ class RenderedTool {
 
   [[nodiscard]] virtual RenderedWorld& world() noexcept = 0;
 
-  // At rest at this pose. Angles are counted from the orientation at the first start.
+  // Starts at rest at this pose. Angles count from the orientation at the first start.
   virtual void start(const models::Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept = 0;
-  // The torque about the rendered point for this period, before step(). A point turns at once; a fault in that is told
-  // by step().
+  // Sets the torque about the rendered point for this period; call before step(). A point tool turns at once; step()
+  // reports a fault of this.
   virtual void turn(const models::Vec3& torque_W) noexcept = 0;
   [[nodiscard]] virtual bool turns_in_step() const noexcept = 0;
-  // One period under the hand's force, as RenderedWorld has it; with the torque of the limits of turning.
+  // One period under the hand's force, as in RenderedWorld; includes the torque of the limits of turning.
   virtual WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept = 0;
 
-  // The arm couldn't follow: the proxy goes on with this velocity from the place nearest to q_W that the scene lets it
-  // reach, and turns on as it did; with R_WT and ω, from that orientation with that angular velocity. Returns the
-  // place.
+  // The arm couldn't follow: the proxy continues with velocity v from the place nearest to q_W that the scene lets it
+  // reach. It keeps turning as before; the second form sets orientation and angular velocity. Returns the place.
   virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W, const Eigen::Quaterniond& R_WT,
                       const models::Vec3& omega_W) noexcept {
     turn_to(R_WT, omega_W);
     return world().resume(q_W, v_W);
   }
-  // It turns on from R_WT with ω, and goes on from where it is, which is q_W, with v_W. Returns the place.
+  // Continues turning from R_WT with ω, and moving from its present place q_W with v_W. Returns the place.
   virtual models::Vec3 turn_on(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W, const models::Vec3& q_W,
                                const models::Vec3& v_W) noexcept = 0;
 
   virtual void set(const Change& change) noexcept = 0;
-  // What hangs behind the sensor is another than was taken: the proxy's mass with it. The inertia that is felt stays.
+  // Changes the figures of the tool behind the sensor, with the proxy's mass. The felt inertia stays.
   virtual void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept = 0;
   virtual void set_period(double period_s) noexcept = 0;
-  virtual void limit_turning(double share) noexcept = 0;  // of the speed limit, from 0 to 1
+  virtual void limit_turning(double share) noexcept = 0;  // share of the speed limit, 0 to 1
   virtual void add_turning_damping(double damping_Nms_per_rad) noexcept = 0;
 
   [[nodiscard]] virtual const Eigen::Quaterniond& R_WT() const noexcept = 0;
   [[nodiscard]] virtual models::Vec3 omega_W() const noexcept = 0;  // mean over the last step, rad/s
-  [[nodiscard]] virtual bool turns() const noexcept = 0;            // false: its orientation is held
+  [[nodiscard]] virtual bool turns() const noexcept = 0;            // false: the orientation is held
   [[nodiscard]] virtual bool turning_limited() const noexcept = 0;  // in the last step
   [[nodiscard]] virtual TurnSets sets() const noexcept = 0;         // of turning, in the next step
   [[nodiscard]] virtual double inertia_kg_m2() const noexcept = 0;
-  // The user's, and with what was added to it.
+  // The user's damping; and with the added damping.
   [[nodiscard]] virtual double own_turning_damping_Nms_per_rad() const noexcept = 0;
   [[nodiscard]] virtual double turning_damping_Nms_per_rad() const noexcept = 0;
   [[nodiscard]] virtual double kinetic_J(const WorldStep& step) const noexcept = 0;
 
-  // A torque that brings its turning to rest within TurnSets::braking_s, beyond what its damping does.
+  // Torque that brings turning to rest within TurnSets::braking_s, in addition to the damping.
   [[nodiscard]] models::Vec3 braking_torque_W() const noexcept;
 
   virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
@@ -75,12 +74,12 @@ class RenderedTool {
 
 class PointTool final : public RenderedTool {
  public:
-  // `behind_sensor_T`: as in OrientationConfig, for an inertia that is set.
+  // behind_sensor_T: as in OrientationConfig, for a later set inertia.
   PointTool(std::unique_ptr<RenderedWorld> world, const OrientationConfig& orientation,
             models::Mat3 behind_sensor_T = models::Mat3::Zero())
       : world_(std::move(world)), orientation_(orientation), behind_sensor_T_(std::move(behind_sensor_T)) {}
 
-  // Angles are counted from this orientation.
+  // Angles count from this orientation.
   void count_from(const Eigen::Quaterniond& R_WT) noexcept { orientation_.count_from(R_WT); }
 
   RenderedWorld& world() noexcept override { return *world_; }

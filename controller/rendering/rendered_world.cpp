@@ -15,17 +15,17 @@ using models::Vec3;
 
 namespace {
 
-constexpr double rounding_m = 1e-12;  // of positions of some metres, a few operations
+constexpr double rounding_m = 1e-12;  // rounding of positions of some metres after a few operations
 
-// The anchor of the spring of (26). It is the start position, except for a while after the spring has become stiffer
-// and after a hold.
+// The anchor of the spring of (26): the start position, except for a while after the spring became stiffer and after a
+// hold.
 //
-// With q the proxy and a the anchor, K'(a' − q) = K(a − q) gives the a' that keeps the force when K becomes K'. If
-// there was no spring before, a' is q itself. From a' the anchor returns, as a driven object moves to its place:
-//     v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: the distance that is left
+// With q the proxy and a the anchor, K'(a' − q) = K(a − q) gives the a' that keeps the force when K becomes K'; without
+// a spring before, a' = q. From a' the anchor returns as a driven object moves:
+//     v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: remaining distance
 // A mass on an undamped spring oscillates with at most v about an anchor that moves at v, and with at most 2v after
-// that anchor has stopped. So with nobody at the handle, the proxy is no faster than 2 v_max = 0.1 m/s. A spring that
-// becomes softer throws nobody, so its anchor stays.
+// that anchor has stopped. So with nobody at the handle, the proxy is no faster than 2 v_max = 0.1 m/s. A softer spring
+// makes no jump that could hurt, so its anchor stays.
 template <int N>
 class SpringAnchor {
  public:
@@ -36,7 +36,7 @@ class SpringAnchor {
     home_ = at_ = home;
     speed_ = 0.0;
   }
-  // After a hold the spring begins without force, since the person may have left the handle.
+  // After a hold the spring starts without force, since the person may have left the handle.
   void start_again(const V& q) noexcept {
     at_ = q;
     speed_ = 0.0;
@@ -81,7 +81,7 @@ class WorldOfDimension final : public RenderedWorld {
     space_.start(q_W);
     ProxyStart<N> start;
     start.q = space_.start();
-    // After a hold the scene goes on from where it stopped.
+    // After a hold the scene continues from the time at which it stopped.
     if (started_) start.time_s = proxy_.time_s();
     proxy_.start(start);
     if (started_) {
@@ -96,9 +96,9 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   Vec3 resume(const Vec3& q_W, const Vec3& v_W) noexcept override {
-    // One evaluation of 𝒢 goes as far as the scene allows, for any κ. From outside of all objects this leads nearer to
-    // the wanted place. From inside of one, where limits made the contact give way, 𝒢 leads out at once, however far
-    // that is; then the wanted place is taken instead.
+    // One evaluation of 𝒢 goes to the nearest place that the scene allows, for any κ. From outside all objects this
+    // leads nearer to the wanted place. From inside one, where limits made the contact give way, 𝒢 moves out at once
+    // over any distance; then the wanted place is used instead.
     const Vec<N> wanted = space_.from_W(q_W), v = space_.basis().transpose() * v_W;
     if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
     ProxyStart<N> start;
@@ -175,10 +175,10 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
  private:
-  // If the scene doesn't allow the start position (some micrometres off a guide, or inside of a wall), the proxy starts
-  // at rest at 𝒢 of that position, with q(k−2) = q(k−1). As a step of (26) the same displacement would be a velocity:
-  // 21 µm in a millisecond. Returns false if there was nothing to settle. If limits hold the proxy back, settling takes
-  // several steps.
+  // If the scene excludes the start position (some micrometres off a guide, or inside a wall), the proxy starts at rest
+  // at 𝒢 of that position, with q(k−2) = q(k−1). As a step of (26) the displacement would be a velocity: 21 µm in a
+  // millisecond. Returns false if nothing had to be settled. If limits hold the proxy back, settling takes several
+  // steps.
   bool settle() noexcept {
     unsettled_ = false;
     const Vec<N> before = proxy_.q();
@@ -226,13 +226,13 @@ class WorldOfDimension final : public RenderedWorld {
   SceneSpace<N> space_;
   LimitedAlgorithm<N> limited_;
   AdmittanceProxy<N> proxy_;
-  std::unique_ptr<Lookahead<N>> ahead_;  // null: without lookahead
+  std::unique_ptr<Lookahead<N>> ahead_;  // null: no lookahead
   SpringAnchor<N> anchor_;
   Touches touches_;
-  WorldStep last_;  // its touches are among these
+  WorldStep last_;  // its touches are stored in touches_
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0;
   bool started_ = false;
-  bool unsettled_ = false;  // the proxy may be where the scene doesn't allow it
+  bool unsettled_ = false;  // the proxy may be at a place that the scene excludes
 };
 
 }  // namespace

@@ -39,7 +39,7 @@ void SceneChanges::step() noexcept {
   }
 }
 
-// One step of an object's friction. Returns true until the wanted value is reached.
+// One step of an object's friction. Returns true until it has the wanted value.
 bool SceneChanges::rub(std::size_t index) noexcept {
   Object& object = objects_[index];
   if (object.friction == object.wanted_friction) return false;
@@ -49,8 +49,8 @@ bool SceneChanges::rub(std::size_t index) noexcept {
   return object.friction != object.wanted_friction;
 }
 
-// One step of an object's place. Returns true until it has arrived. An obstacle computes its motion from the last two
-// places that it was told, so one that has arrived is told its place a second time: then it is at rest.
+// One step of an object's place. Returns true until it has arrived. An obstacle computes its motion from its last two
+// places. An object that has arrived therefore sends its place a second time: then it is at rest.
 bool SceneChanges::move(std::size_t index) noexcept {
   Object& object = objects_[index];
   if (!object.driven) return false;
@@ -99,7 +99,7 @@ void SceneChanges::archive(fieldbus::StateArchive& state) noexcept {
   state(under_way_);
 }
 
-// Tells the scene an object's friction, and its last two places, from which an obstacle computes its motion.
+// Sends an object's friction and last two places to the scene; an obstacle computes its motion from these two.
 void SceneChanges::tell_scene(std::size_t index) noexcept {
   Object& object = objects_[index];
   if (object.rubs && object.friction >= 0.0) scene_->set_friction(index, object.friction);
@@ -109,7 +109,7 @@ void SceneChanges::tell_scene(std::size_t index) noexcept {
   drive(index, now_m);
 }
 
-// If nothing has changed since the last call and nothing is under way, the scene knows all already.
+// If nothing has changed since the last call and no change is under way, the scene is up to date.
 void SceneChanges::follow(const SceneChanges& other) noexcept {
   const bool idle = !under_way_ && !other.under_way_;
   period_s_ = other.period_s_;

@@ -1,12 +1,12 @@
-// Changes of friction and place of a scene's objects while it is touched, without a discontinuity in either.
+// Changes the friction and place of a scene's objects during rendering, without a jump of either.
 //
-// A driven object (scenes::Motion::driven) moves straight to where it is wanted, at speed_m_per_s and
-// acceleration_m_per_s2 at most. It sweeps what is in its way, as any moving object does:
-//   v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: the distance that is left
+// A driven object (scenes::Motion::driven) moves straight to its wanted place, at most at speed_m_per_s and
+// acceleration_m_per_s2, and pushes like any moving object:
+//   v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: remaining distance
 // √(2ad) is the speed from which braking at a ends within d. The last step ends exactly at the place. μ changes by at
-// most friction_per_s, so that a sliding proxy feels no step of force.
+// most friction_per_s, so that a sliding proxy feels no jump of force.
 //
-// set() and step() neither allocate, lock nor throw. If nothing is under way, step() only tests one number.
+// set() and step() neither allocate, lock nor throw. Without changes, step() only tests one value.
 #pragma once
 
 #include <cstdint>
@@ -26,19 +26,18 @@ class SceneChanges {
   // Precondition: the scene outlives this object.
   SceneChanges(scenes::CompiledScene& scene, double period_s);
 
-  // Takes Parameter::friction of an object with friction, and Parameter::position of a driven one. Anything else
-  // changes nothing.
+  // Handles Parameter::friction of an object with friction and Parameter::position of a driven one; ignores all else.
   void set(const Change& change) noexcept;
   void set_period(double period_s) noexcept { period_s_ = period_s; }
   // Precondition: called before each step of the proxy.
   void step() noexcept;
 
-  // Takes over the state of `other`, in a scene of its own that was compiled from the same file.
+  // Copies the state of `other` into its own scene, compiled from the same file.
   void follow(const SceneChanges& other) noexcept;
 
-  // The present μ of an object, by its index in the scene; 0 if there is no such object.
+  // Present μ of an object, by its index in the scene; 0 if there is no such object.
   [[nodiscard]] double friction(std::int32_t object) const noexcept;
-  // An object's present displacement from where the scene describes it, m.
+  // Present displacement of an object from its place in the scene file, m.
   [[nodiscard]] models::Vec3 position_m(std::int32_t object) const noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept;

@@ -16,7 +16,8 @@ using models::Vec3;
 
 namespace {
 
-// v_r: how fast a coupling may give back what it holds. A hand that leaves a wall faster finds it softer, nothing else.
+// v_r: speed at which a coupling may release its energy. A hand that leaves a wall faster feels a softer wall, nothing
+// else.
 constexpr double release_m_per_s = 0.07;
 
 JointVector largest_torques(const std::vector<description::DriveDescription>& drives) {
@@ -107,7 +108,7 @@ class TorquesOfDimension final : public TorqueRendering {
     return c.stiffness_N_per_m * (rest_W - p_W) - c.damping_Ns_per_m / c.period_s * (p_W - p_k1_W_);
   }
 
-  // Steps the device's own limits, for a world that renders f while its proxy goes by `q_step_W`. Returns e.
+  // Steps the device's limits while the world renders f and its proxy moves by q_step_W. Returns e.
   double keep_device(const JointVector& link_rad, const Vec3& f_W, const Vec3& q_step_W,
                      double max_tool_speed_m_per_s) noexcept {
     carried_Nm_ = arm_->gravity_torque(link_rad) + missing_Nm_;

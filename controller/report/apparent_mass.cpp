@@ -17,8 +17,8 @@ using Complex3 = std::array<Complex, 3>;
 constexpr double low_Hz = 0.3, high_Hz = 2.0, step_Hz = 0.05;
 constexpr double longest_segment_s = 10.0, shortest_segment_s = 0.5, least_travel_m = 1e-3;
 
-// Tukey's window, flat in the middle half with a cosine at either end. It keeps motion outside of the model (the arm's
-// resonance, say) from leaking into the band when a segment ends in motion.
+// Tukey's window, flat in the middle half with a cosine at either end. If a segment ends in motion, it keeps motion
+// outside the model (such as the arm's resonance) from leaking into the band.
 double tukey_window(std::size_t i, std::size_t count) {
   const double x = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
   const double edge = std::min(x, 1.0 - x) / 0.25;
@@ -73,7 +73,7 @@ ApparentMass::Spectrum ApparentMass::Spectrum::at(double frequency_Hz, const std
   return s;
 }
 
-// Removes a constant force from one axis: the part of each signal along the window's own transform.
+// Removes a constant force from one axis: each signal's component along the window's transform.
 void ApparentMass::take_off_constant(std::vector<Spectrum>& band, std::size_t axis) {
   double ww = 0.0;
   for (const Spectrum& s : band) ww += std::norm(s.window);
@@ -122,8 +122,8 @@ void ApparentMass::add_to_normal_equations(const Spectrum& s, std::size_t axis) 
 
 std::optional<ApparentMass::Estimate> ApparentMass::estimate() const {
   const Eigen::Vector3d size = regressors_.diagonal().cwiseSqrt();
-  if (!(size.minCoeff() > 0.0) || with_force_.isZero(0.0)) return std::nullopt;  // nothing moves, or nobody moves it
-  // Scaled to ones on the diagonal. Below a part in a million, a and v can't be told apart (a single exponential, say).
+  if (!(size.minCoeff() > 0.0) || with_force_.isZero(0.0)) return std::nullopt;  // no motion, or no force
+  // Scaled to a unit diagonal. Below 1e-6, a and v can't be told apart, as in a single exponential.
   const Eigen::Matrix3d scaled = size.cwiseInverse().asDiagonal() * regressors_ * size.cwiseInverse().asDiagonal();
   const Eigen::Vector3d force = with_force_.cwiseQuotient(size);
   const Eigen::Matrix2d two = scaled.topLeftCorner<2, 2>();
@@ -162,7 +162,7 @@ void FeltMassCurve::end_segment() {
   summed_ = 0;
 }
 
-// The acceleration is that of the sample before, whose force is kept.
+// The acceleration belongs to the last sample, whose force was kept.
 void FeltMassCurve::add(const Vec3& force_N, const Vec3& position_m) {
   if (last_positions_.size() == 2) {
     const Vec3 a = (position_m - 2.0 * last_positions_[1] + last_positions_[0]) / (period_s_ * period_s_);
@@ -236,7 +236,7 @@ FeltMassCurve::Sums FeltMassCurve::all_axes(std::size_t band) const {
   return all;
 }
 
-// Nothing where the force isn't that of one mass.
+// nullopt if the force isn't that of one mass.
 std::optional<FeltMassCurve::Point> FeltMassCurve::point(std::size_t band, const Sums& s) const {
   if (segments_ < least_segments || !(s.acceleration > 0.0)) return std::nullopt;
   if (!(std::norm(s.force_acceleration) >= least_coherence * s.force * s.acceleration)) return std::nullopt;
@@ -252,7 +252,7 @@ std::vector<FeltMassCurve::Point> FeltMassCurve::points() const {
 }
 
 std::vector<FeltMassCurve::Point> FeltMassCurve::points_along(std::size_t axis) const {
-  constexpr double least_share = 0.25;  // of the strongest axis' squared acceleration
+  constexpr double least_share = 0.25;  // of the strongest axis's squared acceleration
   std::vector<Point> points;
   for (std::size_t band = 0; band < bands; ++band) {
     double strongest = 0.0;
@@ -270,7 +270,7 @@ double band_within_Hz(const std::vector<FeltMassCurve::Point>& curve, double mas
     const double error = std::abs(point.mass_kg - mass_kg) / mass_kg;
     if (error > limit) {
       if (within_Hz == 0.0) return 0.0;
-      // Between the two, on the straight line through their logarithms.
+      // Interpolated linearly in logarithms.
       const double share = std::log(limit / error_there) / std::log(error / error_there);
       return within_Hz * std::pow(point.frequency_Hz / within_Hz, share);
     }

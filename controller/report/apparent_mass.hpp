@@ -1,18 +1,17 @@
-// How heavy the tool feels in free motion: Re(F/a) between 0.3 and 2 Hz, from the hand's force F and the tool's
-// acceleration a.
+// Measures how heavy the tool feels in free motion: Re(F/a) between 0.3 and 2 Hz, from the hand's force F and the
+// tool's acceleration a.
 //
 // F̂, â, v̂, ĵ are the windowed Fourier transforms of force, acceleration, velocity and jerk over a segment of free
-// motion. For F = M a + B v + N ȧ they satisfy F̂(ω) = M â(ω) + B v̂(ω) + N ĵ(ω) at every ω and for any window, so M
+// motion. For F = M a + B v + N ȧ they satisfy F̂(ω) = M â(ω) + B v̂(ω) + N ĵ(ω) at every ω and for any window. M
 // follows by least squares over the band, all axes and all segments:
 //   [M, B, N] = argmin Σ |F̂ − M â − B v̂ − N ĵ|²,   ω = 2π · (0.3, 0.35, … 2.0 Hz)
-// M is Re(F/a): in a long record a is orthogonal to v and ȧ, and M = Re Σ F̂ â* / Σ |â|². In a short one it isn't, and a
-// tool that lags (F = M a(t + τ), so N = Mτ) would seem lighter without the third term. The damping is Im(F/a) times ω
-// as one number: B of the fit without ĵ. A lag makes it negative, by about Mω²τ. A constant force (an offset of the
-// sensor, a hand that leans) is taken off per segment and axis by projecting out the window's own transform.
+// M is Re(F/a): in a long record a is orthogonal to v and ȧ, and M = Re Σ F̂ â* / Σ |â|². In a short record it isn't,
+// and without the third term a tool that lags (F = M a(t + τ), N = Mτ) would seem lighter. The damping is −ω Im(F/a) as
+// one number: B of the fit without ĵ; a lag τ makes it negative, by about Mω²τ. A constant force (sensor offset,
+// leaning hand) is removed per segment and axis by projecting out the window's transform.
 //
-// Works for a short move between two contacts as well as for minutes of a multisine; a segment is cut at 10 s, and one
-// that is shorter than 0.5 s or moves less than 1 mm says nothing and is left out. Memory is bounded by one segment.
-// Not for the cycle.
+// Works for a short move as well as for minutes of a multisine. A segment ends after 10 s; one that is shorter than 0.5
+// s or moves less than 1 mm is left out. Memory is bounded by one segment. Not for the cycle.
 #pragma once
 
 #include <array>
@@ -30,17 +29,17 @@ class ApparentMass {
  public:
   explicit ApparentMass(double period_s) : period_s_(period_s) {}
 
-  // The next sample of free motion, one period after the one before it.
+  // Adds a sample of free motion, one period after the last one.
   void add(const models::Vec3& force_N, const models::Vec3& position_m);
-  // Free motion is interrupted; what follows is another segment.
+  // Free motion is interrupted; the next sample begins another segment.
   void end_segment();
 
   struct Estimate {
     double mass_kg = 0.0;
     double damping_Ns_per_m = 0.0;
-    double used_s = 0.0;  // length of the segments that were used
+    double used_s = 0.0;  // length of the segments used
   };
-  // Of all segments that have ended; nothing when none was usable.
+  // From all finished segments; nullopt if none was usable.
   [[nodiscard]] std::optional<Estimate> estimate() const;
 
  private:
@@ -56,30 +55,29 @@ class ApparentMass {
   double used_s_ = 0.0;
 };
 
-// The mass that is felt, by frequency, in sessions that excite many: F/a = M(f), complex, from 0.3 to 15 Hz.
+// The felt mass by frequency, for sessions that excite many: F/a = M(f), complex, from 0.3 to 15 Hz.
 //
-// Welch's method: free motion is cut into segments of 5 s that overlap by half, with Hann's window. In a band of a
-// tenth of f to either side, over its lines, all segments and axes,
+// Welch's method: free motion is cut into segments of 5 s that overlap by half, with Hann's window. Each band reaches
+// f/10 to either side; summed over its lines, all segments and axes,
 //   M(f) = Σ F̂ â* / Σ |â|²,   γ² = |Σ F̂ â*|² / (Σ |F̂|² Σ |â|²)
-// A band in which γ² is below 0.9 wasn't excited, or not by one mass, and is left out; so are bands of fewer than
-// three segments. Force and acceleration are averaged over some 10 ms first, both alike, so that M(f) doesn't change.
+// A band with γ² below 0.9 wasn't excited, or not by one mass, and is left out; so are bands with fewer than three
+// segments. Force and acceleration are first averaged over some 10 ms alike, so M(f) doesn't change.
 class FeltMassCurve {
  public:
   explicit FeltMassCurve(double period_s);
 
-  // The next sample of free motion, one period after the one before it.
+  // As in ApparentMass.
   void add(const models::Vec3& force_N, const models::Vec3& position_m);
-  // Free motion is interrupted.
   void end_segment();
 
   struct Point {
     double frequency_Hz = 0.0;
     std::complex<double> mass_kg;
   };
-  // Of all directions together, in the order of their frequencies; empty where nothing was excited.
+  // Over all directions, in ascending frequency; empty if nothing was excited.
   [[nodiscard]] std::vector<Point> points() const;
-  // Along one axis of W (0 to 2). Where the tool moves along another one and this one less than half as much, its
-  // motion is what the others make of it, and says nothing of its own mass: such a band is left out.
+  // Along one axis of W (0 to 2). A band is left out if the tool moves less than half as much along this axis as along
+  // another: the motion then follows from the others and shows no mass.
   [[nodiscard]] std::vector<Point> points_along(std::size_t axis) const;
 
  private:
@@ -105,7 +103,8 @@ class FeltMassCurve {
   std::size_t segments_ = 0;
 };
 
-// Up to which frequency, from the first point on, |M(f) − M|/M stays within `limit`; 0: not even there.
+// Returns the frequency up to which, from the first point on, |M(f) − M|/M stays within `limit`; 0: not even at the
+// first.
 double band_within_Hz(const std::vector<FeltMassCurve::Point>& curve, double mass_kg, double limit);
 // The limits that summaries name.
 inline constexpr std::array<std::pair<const char*, double>, 3> felt_limits{

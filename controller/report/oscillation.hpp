@@ -1,18 +1,15 @@
-// Whether the arm swung by itself: the longest spell in which PassivityObserver found an oscillation, with its
-// frequency and amplitude, for the verdict of the summary.
+// Finds the longest spell in which the arm swung by itself, with its frequency and amplitude, for the summary's
+// verdict.
 //
-// The observer (controller/stability/passivity.hpp) says in each cycle whether the tool moves above the band of a
-// hand's will and the device gives the hand energy there, and whether that lasts. Cycles that say so make a spell as
-// long as pauses between them are shorter than `pause_s`: an oscillation that a wall stops in every period has such. A
-// blow is a spell of some 0.1 to 0.3 s, an arm that rings after it one of up to 1.4 s; an unstable loop swings until
-// something limits it.
+// PassivityObserver (controller/stability/passivity.hpp) reports in each cycle whether the tool oscillates and whether
+// that lasts. Oscillating cycles form one spell if pauses between them are shorter than `pause_s`, since a wall
+// interrupts it in every period. A blow is a spell of some 0.1 to 0.3 s, the ringing after it one of up to 1.4 s.
 //
-// Position and velocity of the spell, behind a high-pass H of n = 5 equal stages (fc = 4 Hz, which leaves 0.02 of 2
-// Hz), have the mean squares ⟨z²⟩ and ⟨ż²⟩; of a sinusoid of amplitude A and frequency ω
+// Position and velocity of the spell pass through a high-pass H of n = 5 equal stages (fc = 4 Hz, which leaves 0.02 of
+// 2 Hz); ⟨z²⟩ and ⟨ż²⟩ are their mean squares. A sinusoid of amplitude A and frequency ω has
 //   ω² = ⟨ż²⟩/⟨z²⟩,   A = √(2⟨z²⟩)/|H(ω)|,   |H| = (1 + (2πfc/ω)²)^(−n/2).
-// Of a tool that turns, ⟨z²⟩ and ⟨ż²⟩ count place and rotation together, as PassivityObserver does: ⟨z² + ρ²ζ²⟩ with
-// ρ² = J/M. Each has its own amplitude then, at the common ω.
-// Vectors in W. Not for the cycle: whoever drains the records calls it.
+// For a tool that turns, ⟨z²⟩ and ⟨ż²⟩ combine position and rotation as in PassivityObserver: ⟨z² + ρ²ζ²⟩ with ρ² =
+// J/M. Each has its own amplitude at the common ω. Vectors in W. Not for the cycle.
 #pragma once
 
 #include <array>
@@ -25,10 +22,10 @@ namespace proxarm::controller {
 
 struct Oscillation {
   double from_s = 0.0;      // time of the record in which the spell began
-  double duration_s = 0.0;  // 0: there was none
+  double duration_s = 0.0;  // 0: no oscillation
   double frequency_Hz = 0.0;
-  double amplitude_m = 0.0;             // of the tool's place
-  std::optional<double> amplitude_rad;  // of its rotation; none: it doesn't turn
+  double amplitude_m = 0.0;             // of the tool's position
+  std::optional<double> amplitude_rad;  // of its rotation; absent: it doesn't turn
   bool lasts = false;
 };
 
@@ -39,33 +36,33 @@ class OscillationWatch {
   struct Cycle {
     bool oscillates = false, lasts = false;
     models::Vec3 tool_W = models::Vec3::Zero();
-    // Of a tool that turns: the sum of its angles so far, rad, and ρ², m²/rad².
+    // For a tool that turns: the sum of its rotations so far, rad, and ρ², m²/rad².
     bool turns = false;
     models::Vec3 turned_W = models::Vec3::Zero();
     double gyration_m2 = 0.0;
   };
-  // A cycle of rendering; consecutive ones, or reset() between them.
+  // Adds a cycle of rendering, which follows the last one; else call reset() before.
   void add(double time_s, double period_s, const Cycle& cycle) noexcept;
   // The next cycle doesn't follow the last one.
   void reset() noexcept;
 
-  // The spell that goes on now; and the longest of all that last, or of all if none does.
+  // The present spell; and the longest of those that last, or of all if none lasts.
   [[nodiscard]] Oscillation present() const noexcept;
   [[nodiscard]] Oscillation longest() const noexcept;
 
  private:
   struct Spell {
     double from_s = 0.0, until_s = 0.0;
-    double z2 = 0.0, zdot2 = 0.0;          // sums of the squares, place and rotation together,
-    double place2 = 0.0, rotation2 = 0.0;  // and each for itself,
-    double cycles = 0.0;                   // of so many
+    double z2 = 0.0, zdot2 = 0.0;          // sums of squares, position and rotation together,
+    double place2 = 0.0, rotation2 = 0.0;  // and separately,
+    double cycles = 0.0;                   // over this number of cycles
     bool turns = false, lasts = false;
     [[nodiscard]] double duration_s() const noexcept { return until_s - from_s; }
     [[nodiscard]] bool outdoes(const Spell& other) const noexcept;
     [[nodiscard]] Oscillation measured() const noexcept;
   };
   struct Stage {
-    models::Vec3 x, z;  // what came in and went out in the cycle before
+    models::Vec3 x, z;  // input and output of the last cycle
   };
   static constexpr std::size_t stage_count = 5;
   struct HighPass {

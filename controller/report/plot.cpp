@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using models::Vec3;
 
 constexpr std::size_t most_samples = 4000;
-constexpr double nothing_rad = 1e-6;  // its axis is known to 1e-9
+constexpr double nothing_rad = 1e-6;  // a smaller turn has no reliable axis; it is known to 1e-9
 
 // Of the picture, in pixels.
 constexpr double head = 112.0, row_height = 236.0, between_rows = 21.0, foot = 108.0;
@@ -27,19 +27,19 @@ constexpr double head = 112.0, row_height = 236.0, between_rows = 21.0, foot = 1
 
 double PlotBuilder::height_px() const noexcept { return head + row_height * rows() + foot; }
 
-// The next panel is drawn in this row.
+// Draws the next panel in this row.
 void PlotBuilder::place(std::ostream& gp, int row) const {
   const double top = head + row_height * row, bottom = top + row_height - between_rows;
   gp << "set tmargin at screen " << 1.0 - top / height_px() << "\nset bmargin at screen " << 1.0 - bottom / height_px()
      << "\n";
 }
 
-// What the position panels show: coordinates along `directions` from `origin`.
+// Coordinates of the position panels: along `directions` from `origin`.
 struct PlotBuilder::Axes {
   bool wall = false;  // directions[0] is the normal, directions[1] along the slide
   Vec3 origin = Vec3::Zero();
   std::array<Vec3, 3> directions{Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()};
-  Vec3 turn = Vec3::UnitZ();  // what turns and torques are about
+  Vec3 turn = Vec3::UnitZ();  // axis of the shown rotations and torques
 };
 
 struct PlotBuilder::Range {
@@ -67,7 +67,7 @@ void PlotBuilder::add(const CycleRecord& record) {
   }
   if (seen_++ % stride_ != 0) return;
   if (samples_.size() >= most_samples) {
-    // Twice as coarse from here on, and back to the start.
+    // Halves the resolution, also of the samples so far.
     for (std::size_t i = 0; 2 * i < samples_.size(); ++i) samples_[i] = samples_[2 * i];
     samples_.resize((samples_.size() + 1) / 2);
     stride_ *= 2;
@@ -103,7 +103,7 @@ PlotBuilder::Axes PlotBuilder::axes() const {
     const Vec3 d = vec3(s->proxy) - vec3(first->proxy), along = d - n.dot(d) * n;
     if (s->contact != ContactPhase::free && along.norm() > farthest.norm()) farthest = along;
   }
-  // Nothing slid: any direction along the wall will do.
+  // Nothing slid: any direction along the wall serves.
   if (!(farthest.norm() > 1e-6)) farthest = n.unitOrthogonal();
   axes.wall = true;
   axes.origin = vec3(first->proxy);
@@ -111,14 +111,15 @@ PlotBuilder::Axes PlotBuilder::axes() const {
   return axes;
 }
 
-// Since the first sample, as rotation vectors in W; of those that say the same the one nearest to the one before.
+// Rotation vectors in W since the first sample. Of equivalent vectors, the one nearest to the last is taken.
 std::vector<Vec3> PlotBuilder::turns(std::array<double, 4> Sample::*orientation) const {
   std::vector<Vec3> turns;
   const models::Quaternion first = models::Quaternion((samples_.front().*orientation).data());
   Vec3 before = Vec3::Zero();
   for (const Sample& s : samples_) {
     Vec3 turn = models::rotation_vector(models::Quaternion((s.*orientation).data()) * first.conjugate());
-    const bool whole = turn.norm() < nothing_rad && before.norm() > 1.0;  // a revolution, and its axis is rounding
+    const bool whole = turn.norm() < nothing_rad && before.norm() > 1.0;  // a revolution, whose axis is lost to
+                                                                          // rounding
     const Vec3 revolution = 2.0 * std::numbers::pi * (whole ? before : turn).stableNormalized();
     if (!turn.isZero(0.0) || whole)
       turn += std::round((before - turn).dot(revolution) / revolution.squaredNorm()) * revolution;
@@ -127,7 +128,7 @@ std::vector<Vec3> PlotBuilder::turns(std::array<double, 4> Sample::*orientation)
   return turns;
 }
 
-// Of the widest turn; where there is none, of the largest torque. Its largest coordinate is above 0.
+// The axis of the widest turn; without a turn, of the largest torque. Its largest coordinate is positive.
 Vec3 PlotBuilder::turning_axis(const std::vector<Vec3>& turns) const {
   const auto less = [](const Vec3& a, const Vec3& b) { return a.squaredNorm() < b.squaredNorm(); };
   Vec3 most = *std::max_element(turns.begin(), turns.end(), less);
@@ -140,7 +141,7 @@ Vec3 PlotBuilder::turning_axis(const std::vector<Vec3>& turns) const {
   return most[largest] < 0.0 ? Vec3(-most.normalized()) : Vec3(most.normalized());
 }
 
-// Contact phases as intervals; one that is too short to be seen is added to the one before it.
+// Contact phases as intervals; one too short to be seen is merged with the one before it.
 std::vector<PlotBuilder::Band> PlotBuilder::bands() const {
   std::vector<Band> bands;
   const double shortest = (samples_.back().time_s - samples_.front().time_s) / 400.0;
@@ -164,7 +165,7 @@ std::vector<PlotBuilder::Band> PlotBuilder::bands() const {
   return bands;
 }
 
-// Columns: time, tool ×3, proxy ×3 (mm), push of the hand, contact force, friction (N), turn of tool and proxy (°),
+// Columns: time, tool ×3, proxy ×3 (mm), push of the hand, contact force, friction (N), rotation of tool and proxy (°),
 // torque of hand and contact (Nm).
 std::string PlotBuilder::data(const Axes& axes) const {
   const std::vector<Vec3> tool_turns = turns(&Sample::tool_q), proxy_turns = turns(&Sample::proxy_q);
@@ -194,8 +195,8 @@ std::string PlotBuilder::data(const Axes& axes) const {
   return text;
 }
 
-// Of a panel that leaves out single peaks (the impulse of an impact is M v/T, hundreds of newtons in one step).
-// `least`: by how much it is made wider where little happened.
+// The range of a panel without single peaks: the impulse of an impact is M v/T, hundreds of newtons in one step.
+// `least`: the smallest margin.
 PlotBuilder::Range PlotBuilder::without_peaks(std::vector<double> values, double least) {
   std::sort(values.begin(), values.end());
   const auto rank = [&values](double part) {
@@ -235,7 +236,7 @@ std::string PlotBuilder::script(const Axes& axes, const std::string& answer) con
      << " lw 1.8\nset style line 3 " << gnuplot_line("contact") << " lw 2.4\nset style line 4 "
      << gnuplot_line("friction") << " lw 2.8\nset style line 5 " << gnuplot_line("hand")
      << " lw 3.2\n"
-     // Of a hand alone: y and z.
+     // For a hand alone: y and z.
      << "set style line 6 lc rgb '" << hand << "' lw 2.4 dt (10,5)\nset style line 7 lc rgb '" << hand
      << "' lw 2.8 dt (2,4)\n"
      << "set xrange [" << from << ":" << to << "]\nset grid lc rgb '#b0b0b0' lw 0.6\n"
@@ -256,7 +257,7 @@ std::string PlotBuilder::script(const Axes& axes, const std::string& answer) con
   return gp.str();
 }
 
-// Returns the labels of those that last long enough to bear one.
+// Returns the labels of phases that are long enough for one.
 std::string PlotBuilder::shade_contacts(std::ostream& gp, double shortest_labelled_s) const {
   int object = 0;
   std::ostringstream labels;
@@ -295,10 +296,10 @@ void PlotBuilder::draw_positions(std::ostream& gp, bool wall, const Ranges& rang
   }
 }
 
-// The orientation is told of a proxy, and of a simulated tool.
+// Draws the rotation of the proxy, and of the tool if simulated.
 void PlotBuilder::draw_turn(std::ostream& gp, const Vec3& axis, const Range& torque_Nm) const {
   char about[80];
-  const auto hundredths = [](double x) { return 0.01 * std::round(100.0 * x) + 0.0; };  // (and no −0)
+  const auto hundredths = [](double x) { return 0.01 * std::round(100.0 * x) + 0.0; };  // also turns −0 into 0
   std::snprintf(about, sizeof about, "about (%.2f, %.2f, %.2f)", hundredths(axis.x()), hundredths(axis.y()),
                 hundredths(axis.z()));
   place(gp, 3);
@@ -325,7 +326,7 @@ void PlotBuilder::draw_forces(std::ostream& gp, bool wall, const Ranges& range) 
      << names[2] << "'\nunset multiplot\n";
 }
 
-// The largest force, where it leaves the panel: an impact's is M v/T in a single cycle.
+// Labels the largest force if it leaves the panel: an impact's is M v/T in a single cycle.
 void PlotBuilder::label_peak(std::ostream& gp, const Axes& axes, const Range& range) const {
   const double peak_N = axes.directions[0].dot(vec3(peak_.contact_force));
   if (!axes.wall || !(peak_N > range.high)) return;

@@ -1,15 +1,13 @@
-// A session as a picture (SVG, by gnuplot): tool and proxy against the wall and along it, forces, contact phases as
-// bands.
+// Draws a session as a picture (SVG, by gnuplot): positions of tool and proxy, forces, contact phases as bands.
 //
-// With a contact, positions are split along the first contact's normal and along the direction in which the proxy then
-// slid farthest; the surface is at 0. Without one, the panels show x, y and z. Where the tool turns, two more show the
-// turn since the start and the torques about the rendered point, both about the axis of the proxy's widest turn. Only
-// Phase::rendering is drawn. Long sessions are thinned out to some thousand points; memory is bounded. Curves differ in
-// dash and width as well as in colour, stick and slip in shade and by name.
+// With a contact, positions are along the first contact's normal and the direction in which the proxy slid farthest;
+// the surface is at 0. Without one, the panels show x, y and z. For a tool that turns, two more panels show rotations
+// since the start and torques about the rendered point, along the axis of the proxy's widest turn. Only
+// Phase::rendering is drawn. Long sessions are thinned out to some thousand points, so memory is bounded. Curves differ
+// in dash and width as well as in colour, sticking and slipping in shade and label.
 //
-// gnuplot is a program of its own and may be absent: then there is no picture but a warning, and nothing else changes.
-// It is started without a shell, in a temporary folder, and no path or name from outside gets into its script unquoted.
-// Not for the cycle.
+// Without gnuplot there is a warning instead of a picture. gnuplot is started without a shell, in a temporary folder,
+// and its script quotes all paths and names from outside. Not for the cycle.
 #pragma once
 
 #include <array>
@@ -26,15 +24,15 @@ namespace proxarm::controller {
 
 class PlotBuilder {
  public:
-  // `title` is one line of plain text above the picture. `gnuplot` is looked up in PATH.
+  // `title`: one line of plain text above the picture. `gnuplot` is looked up in PATH.
   explicit PlotBuilder(std::string title, std::string gnuplot = "gnuplot");
 
   void add(const CycleRecord& record);
 
-  // Nothing was rendered, so there is nothing to draw.
+  // Whether nothing was rendered.
   [[nodiscard]] bool is_empty() const noexcept { return samples_.size() < 2; }
-  // Writes the SVG. Returns a warning in one line where that didn't work; empty when it did.
-  // `answer`: one line above all, what the session comes to (plot_headline() of a summary).
+  // Writes the SVG. Returns a warning of one line on failure, else an empty string. `answer`: the first line of the
+  // picture, plot_headline() of a summary.
   [[nodiscard]] std::string write(const std::filesystem::path& svg, const std::string& answer = "") const;
 
  private:
@@ -69,7 +67,7 @@ class PlotBuilder {
 
   std::string title_, gnuplot_;
   std::vector<Sample> samples_;
-  Sample peak_{};  // of all cycles, the one with the largest force of contact
+  Sample peak_{};  // the cycle with the largest contact force
   std::uint64_t stride_ = 1, seen_ = 0;
   bool truth_ = false, turns_ = false;
 };

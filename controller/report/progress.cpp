@@ -55,7 +55,7 @@ std::string progress_line(double done_s, double total_s, std::string_view note, 
   if (!note.empty()) line += ", ";
   line += note;
   if (line.size() <= columns) return line;
-  // A character of UTF-8 isn't cut.
+  // Doesn't cut inside a UTF-8 character.
   std::size_t end = columns;
   while (end > 0 && (static_cast<unsigned char>(line[end]) & 0xC0) == 0x80) --end;
   return line.substr(0, end);

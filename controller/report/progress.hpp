@@ -1,8 +1,8 @@
-// One line on a terminal that says how far a long run is: "  43 % [=========>           ]  4.3 of 10 s, sliding at 5.2
-// N".
+// Shows the progress of a long run as one line on a terminal: "  43 % [=========>           ]  4.3 of 10 s, sliding at
+// 5.2 N".
 //
-// Drawn to standard error, and only if that is a terminal that can move its cursor; at most ten times a second. Not for
-// the cycle: whoever drains the records calls it.
+// Drawn to standard error at most ten times a second, and only to a terminal that can move its cursor. Not for the
+// cycle.
 #pragma once
 
 #include <chrono>
@@ -14,15 +14,15 @@ namespace proxarm::controller {
 
 class Progress {
  public:
-  // `total_s` of what the run simulates or takes, or a count of things named by `unit`. `stream` is there for tests.
+  // `total_s`: the run's length in seconds, or a count of things named by `unit`. `stream` is for tests.
   explicit Progress(double total_s, std::FILE* stream = stderr, std::string unit = "s");
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
   ~Progress() { clear(); }
 
-  // `done_s` of total_s are done; `note` is put behind it, cut to the line.
+  // `done_s` of total_s are done; `note` follows, cut to the line.
   void update(double done_s, std::string_view note);
-  // Takes the line away, before anything else is printed.
+  // Removes the line, before anything else is printed.
   void clear();
 
   [[nodiscard]] bool enabled() const noexcept { return enabled_; }

@@ -1,21 +1,21 @@
-// A recorded session: a folder that holds what went in, what came out and what it was made with.
+// Writes a recorded session: a folder with its input, its output and its configuration.
 //
 //   signals.csv      a row per cycle (signals/signal_columns.hpp). The first row names columns with units and frames;
-//                    numbers are the shortest that read back to the same double
-//   signals.bin      the same in its place, where that is wanted (signals/signal_table.hpp)
-//   columns.json     unit, frame and meaning of each of them
-//   contacts.csv     a row for each contact of each cycle (signals/contact_columns.hpp), or contacts.bin in its place;
-//                    contact_columns.json has what they mean
+//                    numbers are the shortest text that reads back to the same double
+//   signals.bin      the same in binary, instead of signals.csv (signals/signal_table.hpp)
+//   columns.json     unit, frame and meaning of each column
+//   contacts.csv     a row for each contact of each cycle (signals/contact_columns.hpp), or contacts.bin instead;
+//                    contact_columns.json has the columns' meanings
 //   session.mcap     the same session for other tools (messages/mcap_writer.hpp)
-//   frames.log       every frame on every bus, as `candump -L` writes them, so canplayer and log2asc read it; packed it
-//                    is frames.log.zst
-//   effective.yaml   what the session ran with, every default filled in (and other configuration files by their names)
-//   summary.json     figures that are the same in two runs with the same input (repeatable_json())
+//   frames.log       every frame on every bus, in the format of `candump -L`, for canplayer and log2asc; packed:
+//                    frames.log.zst
+//   effective.yaml   the session's configuration with all defaults (other configuration files under their names)
+//   summary.json     the repeatable figures (repeatable_json())
 //   replay           what `proxarm replay` needs (replay_log.hpp)
-//   timing.json      those of the wall clock (timing_json()); overruns and compute time stand nowhere else
+//   timing.json      the wall clock's figures (timing_json()); only here are overruns and compute time
 //
-// Two runs with the same input give the same bytes in all but timing.json. Not for the cycle: it leaves records in a
-// ring, and whoever drains the ring calls this.
+// Two runs with the same input give the same bytes in all files but timing.json. Not for the cycle: the cycle leaves
+// records in a ring, and its reader calls this class.
 #pragma once
 
 #include <cstdint>
@@ -37,33 +37,30 @@ namespace proxarm::controller {
 
 class SessionWriter {
  public:
-  // Makes the folder, with parents. One that exists must be empty or hold an earlier session, which is replaced;
-  // anything else in it, a folder that can't be written, or one that another session is writing to, throws
-  // description::SetupError with key --record. The folder is locked (flock) for as long as the writer, and processes
-  // that were forked off meanwhile, live.
-  // `axis_names` name the columns of the drives (at most max_axes); `with_truth` adds the columns of the simulation's
-  // truth.
+  // Makes the folder, with parents, or replaces an earlier session in it. Throws description::SetupError with key
+  // --record if the folder holds anything else, can't be written, or another session writes to it. The folder is locked
+  // (flock) while the writer or a process forked meanwhile lives. `axis_names`: for the drives' columns, at most
+  // max_axes. `with_truth`: adds the columns of the simulation's true state.
   SessionWriter(const std::filesystem::path& folder, const std::vector<std::string>& axis_names, bool with_truth,
                 SignalsForm form = SignalsForm::csv);
 
   void add(const CycleRecord& record, const DerivedSignals& derived = {});
-  // Time of the frame's last bit on the network's own clock (which is not the records' time: bring-up comes before the
-  // first cycle), 0 or later.
+  // `time_ns`: of the frame's last bit, ≥ 0, on the network's clock. The records' time differs: bring-up precedes the
+  // first cycle.
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
-  // A file of configuration, as text: effective.yaml, or cell, scene, hand, sensor.yaml, arm.urdf as they were read;
-  // reason.txt: why there is a black box.
+  // Writes a configuration file's text: effective.yaml, or cell, scene, hand, sensor.yaml and arm.urdf as they were
+  // read; reason.txt says why there is a black box.
   void write_file(std::string_view name, std::string_view text);
-  // summary.json and timing.json; closes all files. Throws description::SetupError where a file couldn't be written
-  // whole (a full disk, say).
+  // Writes summary.json and timing.json; closes all files. Throws description::SetupError if a file couldn't be written
+  // completely, for example on a full disk.
   void finish(const Summary& summary);
 
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
 
  private:
-  // Held on a folder.
   class Lock {
    public:
-    // Waits for nobody: whether it is held.
+    // Doesn't block. Returns whether the lock is held.
     bool take(const std::filesystem::path& folder) noexcept;
     Lock() = default;
     Lock(const Lock&) = delete;
@@ -93,7 +90,7 @@ class SessionWriter {
   bool with_truth_;
   SignalsForm form_;
   File signals_, contacts_, frames_;
-  std::optional<SignalTableWriter> table_, contact_table_;  // in the place of signals_ and contacts_
+  std::optional<SignalTableWriter> table_, contact_table_;  // instead of signals_ and contacts_
 };
 
 }  // namespace proxarm::controller

@@ -18,8 +18,7 @@ using models::Vec3;
 constexpr double shortest_slide_s = 0.1;
 constexpr double free_force_N = 1e-3;  // far above rounding (κ times an ulp of q), far below what a hand feels
 
-// Durations in bins of 10 ns up to 1 ms, and beyond that of a hundredth of themselves up to 10 s, so that a median over
-// hours needs no more memory than one over seconds.
+// Durations in bins of 10 ns up to 1 ms, then of 1 % up to 10 s, so that a median over hours needs little memory.
 class Durations {
  public:
   void add(std::int64_t ns) {
@@ -29,7 +28,7 @@ class Durations {
     total_ns_ += ns;
   }
 
-  // The duration that a fraction of all don't exceed, in µs, at most the longest.
+  // The quantile, µs, at most the longest duration.
   [[nodiscard]] double quantile_us(double fraction) const {
     if (count_ == 0) return 0.0;
     const auto rank = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));
@@ -81,7 +80,8 @@ struct Slide {
   double tangential = 0.0, limit = 0.0, length_s = 0.0;
 };
 
-// "limits.leash_m"; a joint's own limit with its name: "axis_2: max_speed_rad_per_s", one for each of `axes`.
+// Parameter names: "limits.leash_m"; for a joint's own limit one for each of `axes`, such as "axis_2:
+// max_speed_rad_per_s".
 std::vector<std::string> parameter_names(Limit limit, const ActiveLimits::Joints& joints,
                                          const std::vector<std::string>& names) {
   const std::string parameter = limit_parameter(limit);
@@ -135,7 +135,7 @@ struct SummaryBuilder::State {
   void slide(const CycleRecord& now, const Vec3& resistance);
 
   SummaryConfig config;
-  double limits_push_J = 0.0;  // that limits have put into the proxy and not taken back
+  double limits_push_J = 0.0;  // energy put in by limits and not taken back
   Summary summary;
   SetpointHash hash;
   Durations durations;
@@ -143,18 +143,18 @@ struct SummaryBuilder::State {
   ApparentMass apparent;
   FeltMassCurve felt;
   ApparentMass apparent_turning;         // the same with angles and torques
-  std::optional<Eigen::Quaterniond> R0;  // where rendering began
-  double inertia_kg_m2 = 0.0;            // of the proxy, in the record before
+  std::optional<Eigen::Quaterniond> R0;  // at the start of rendering
+  double inertia_kg_m2 = 0.0;            // of the proxy, in the last record
   OscillationWatch oscillation;
-  std::optional<Eigen::Quaterniond> R_k1;  // of the steel, where it turns, in the record before,
-  Vec3 turned_W = Vec3::Zero();            // and the sum of its angles
+  std::optional<Eigen::Quaterniond> R_k1;  // of the true tool if it turns, in the last record,
+  Vec3 turned_W = Vec3::Zero();            // and the sum of its rotations
   Slide sliding;
-  double contact_s = 0.0;  // how long the contact has lasted
-  // Whole periods, so that no sum of them rounds.
+  double contact_s = 0.0;  // duration of the present contact
+  // In whole periods, so that sums don't round.
   std::int64_t period_ns, all_ns = 0, rendered_ns = 0, touching_ns = 0, slipping_ns = 0;
   bool changing = false;  // the timestep
   std::int64_t asked_ns = 0;
-  double mass_kg = 0.0;            // of the proxy, in the record before
+  double mass_kg = 0.0;            // of the proxy, in the last record
   std::optional<Vec3> start;       // x₀ of the spring
   std::deque<CycleRecord> recent;  // consecutive cycles of rendering, newest last
 };
@@ -194,7 +194,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
   if (n > kept) s.recent.pop_front();
 }
 
-// Figures that are counted in every phase.
+// Figures over all phases.
 void SummaryBuilder::State::count(const CycleRecord& record) {
   ++summary.cycles;
   all_ns += period_ns;
@@ -227,7 +227,7 @@ void SummaryBuilder::State::count_limit(const std::string& parameter, RecordFlag
   limit.time_s += seconds(period_ns);
 }
 
-// A mass, damping or spring set while rendering counts from then on; the wanted mass is the last one.
+// A mass, damping or spring that is set during rendering counts from then on; the wanted mass is the last one.
 void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
   if (record.tool_mass_kg > 0.0 && config.handle_mass_kg > 0.0) config.handle_mass_kg = record.tool_mass_kg;
   if (record.proxy_mass_kg != mass_kg) {
@@ -246,8 +246,8 @@ void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
   inertia_kg_m2 = record.proxy_inertia_kg_m2;
 }
 
-// Nothing is rendered while the timestep is being changed, and the figures go on with the new one. The apparent mass is
-// that of the last timestep.
+// Nothing is rendered while the timestep changes; figures then go on with the new one. The apparent mass is that of the
+// last timestep.
 void SummaryBuilder::State::follow_timestep(const CycleRecord& record) {
   const bool was_changing = changing;
   changing = record.has(RecordFlag::timestep);
@@ -290,8 +290,8 @@ void SummaryBuilder::State::observe(const CycleRecord& record) {
   p.felt_damping_min_Ns_per_m = std::min(p.felt_damping_min_Ns_per_m, record.felt_damping_Ns_per_m);
 }
 
-// By the truth where there is one. Else the links of a tool that turns are those that the controller takes them for; of
-// another one the encoders tell.
+// From the simulation's true state, if recorded. Otherwise from the controller's estimate of the links for a tool that
+// turns, else from the encoders.
 OscillationWatch::Cycle SummaryBuilder::State::swing(const CycleRecord& record) {
   const bool truth = record.has(RecordFlag::truth);
   OscillationWatch::Cycle cycle{.oscillates = record.has(RecordFlag::oscillation),
@@ -348,7 +348,7 @@ void SummaryBuilder::State::track(const CycleRecord& record) {
   tracking.add((vec3(tool) - vec3(due.proxy_W_m)).norm());
 }
 
-// Figures that need derivatives, of the record before the last, by differences with its neighbours.
+// Figures that need derivatives: central differences at the record before the last.
 void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after) {
   const double T = config.period_s, m = config.handle_mass_kg, M = config.wanted_mass_kg, B = config.damping_Ns_per_m;
   const bool truth = before.has(RecordFlag::truth) && now.has(RecordFlag::truth) && after.has(RecordFlag::truth);
@@ -359,8 +359,8 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
 
   const Vec3 spring = config.spring_N_per_m * (x - *start);
   if (now.contact == ContactPhase::free) {
-    // A world without contacts may act all the same: a field of friction, a soft layer. Where a limit acts, the motion
-    // isn't the mass's.
+    // A world may act without contacts: a field of friction, a soft layer. If a limit acts, the motion isn't that of
+    // the mass.
     if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now) && !now.has(RecordFlag::ramp_in) &&
         !now.has(RecordFlag::hands_off)) {
       felt.add(hand - spring, x);
@@ -372,7 +372,7 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   felt.end_segment();
   apparent_turning.end_segment();
   if (now.contact == ContactPhase::free) return;
-  // `contact_s` is that of `after`: one period more than that of `now`, unless the contact ends there.
+  // `contact_s` belongs to `after`: one period more than at `now`, unless the contact ends there.
   const bool established = after.contact != ContactPhase::free && contact_s - T > config.touch_s;
   if (!established) return;
   // (24): M_p ∇²q(k)/T² + B ∇q(k)/T = h(k) + f(k), with the differences that end at q(k).
@@ -400,7 +400,7 @@ void SummaryBuilder::State::turn(const CycleRecord& now) {
 
 void SummaryBuilder::State::slide(const CycleRecord& now, const Vec3& resistance) {
   if (now.contact != ContactPhase::slip || !(now.contacts[0].friction > 0.0) || now.contact_count > 1) return;
-  if (limited(now)) return;  // what a limit takes is no friction
+  if (limited(now)) return;  // a limit's force isn't friction
   const Vec3 n = vec3(now.contacts[0].normal_W);
   const Vec3 f = vec3(now.contact_force_W_N);
   const Vec3 along = n.dot(f) * n - f;

@@ -18,7 +18,7 @@ std::string format(const char* pattern, double value) {
   return text;
 }
 
-// A length with the unit that makes it readable: "12.3 µm", "0.45 mm", "0 m".
+// A length with a readable unit: "12.3 µm", "0.45 mm", "0 m".
 std::string length(const std::optional<double>& metres) {
   if (!metres) return "none";
   const double size = std::abs(*metres);
@@ -53,7 +53,7 @@ constexpr const char* sgr_of(VerdictTone tone) {  // ECMA-48, select graphic ren
   return tone == VerdictTone::good ? "\x1b[32m" : tone == VerdictTone::look ? "\x1b[33m" : "\x1b[1;31m";
 }
 
-// The summary's lines: names on the left, in a column of their own.
+// The summary's lines, with the names in a column on the left.
 class Lines {
  public:
   explicit Lines(bool colour) : colour_(colour) {}
@@ -76,7 +76,6 @@ class Lines {
   bool colour_;
 };
 
-// What it took: time, processor, buses.
 void tell_time(const Summary& s, Lines& line) {
   line("time", format("%.3f s in ", s.simulated_time_s) + std::to_string(s.cycles) + " cycles, " +
                    format("%.3f s of it rendered; ", s.rendered_time_s) + format("wall clock %.2f s: ", s.wall_time_s) +
@@ -102,7 +101,7 @@ void tell_time(const Summary& s, Lines& line) {
   if (!loads.empty()) line("bus load", loads);
 }
 
-// Up to which frequency the mass is right along each axis that the tool was moved along, the worst axis first.
+// For each axis along which the tool moved, the frequency up to which the mass is right; the worst axis first.
 std::string felt_along(const Summary& s) {
   const auto& [name, limit] = felt_limits[1];  // 10 %
   std::vector<std::pair<double, const char*>> along;
@@ -126,7 +125,7 @@ std::string felt_band(const Summary& s) {
   return "within " + std::string(name) + (band_Hz > 0.0 ? format(" up to %.2g Hz", band_Hz) : " nowhere");
 }
 
-// Up to which frequency the mass is what it should be, and what it is where that is worst.
+// The frequency up to which the mass is right, and the mass where it is worst.
 void tell_felt_mass(const Summary& s, Lines& line) {
   if (s.felt_mass.empty() || !(s.wanted_mass_kg > 0.0)) return;
   std::string bands;
@@ -142,7 +141,7 @@ void tell_felt_mass(const Summary& s, Lines& line) {
                format("phase %.0f degrees", 180.0 / std::numbers::pi * std::arg(last.mass_kg)));
 }
 
-// Below, a world's force is rounding.
+// A smaller force of the world is rounding.
 constexpr double noticeable_N = 1e-3;
 
 std::string apparent_mass(const Summary& s) {
@@ -150,7 +149,7 @@ std::string apparent_mass(const Summary& s) {
          (s.wanted_mass_kg > 0.0 ? format(", wanted %.3f kg", s.wanted_mass_kg) : ", the device's own");
 }
 
-// Below 0 it isn't damping: a delay between push and motion hands out a little energy in each swing.
+// A negative value isn't damping: the delay between push and motion adds a little energy in each swing.
 std::string drag(const std::optional<double>& damping, const char* unit, const char* pattern) {
   if (!damping) return "";
   if (*damping >= 0.0) return "; damping " + format(pattern, *damping) + unit;
@@ -181,7 +180,6 @@ void tell_unresolved(const Summary& s, Lines& line) {
        VerdictTone::look);
 }
 
-// What was felt, and how true it was.
 void tell_motion(const Summary& s, Lines& line) {
   line("apparent mass", apparent_mass(s) + drag(s.apparent_damping_Ns_per_m, "Ns/m", "%.2f ") +
                             (s.limited_cycles > 0 ? "; where no limit acts" : ""));
@@ -230,14 +228,13 @@ std::string poses_text(const UnstablePlaces& there) {
 
 namespace {
 
-// Weber fraction of a mass that is moved by hand: below, hardly anybody notices (docs/view.md cites the sources).
+// Weber fraction of a mass moved by hand: smaller differences are hardly noticed (docs/view.md cites the sources).
 constexpr double noticeable_mass_share = 0.1;
 
 std::string hands_off(const Summary& s) {
   return format("%.3g s: nobody at the handle, the arm stands", s.hands_off_s);
 }
 
-// Whether the loop was stable with this hand.
 void tell_oscillation(const Summary& s, Lines& line) {
   if (!s.oscillation) return;
   if (s.oscillation->duration_s == 0.0) return line("oscillation", "none");
@@ -248,7 +245,7 @@ void tell_oscillation(const Summary& s, Lines& line) {
   line("", "a longer setpoint filter; `proxarm tune` says which mass, and `damping added` what --passivity did");
 }
 
-// The longest first, each with its time.
+// Longest first, each with its time.
 std::string limits_in_brief(const Summary& s) {
   if (s.active_limits.empty()) return "none";
   std::vector<std::pair<double, const std::string*>> longest;
@@ -262,7 +259,7 @@ std::string limits_in_brief(const Summary& s) {
   return longest.size() <= most ? text : text + " and " + std::to_string(longest.size() - most) + " more";
 }
 
-// What kept the motion back, and the energy that went through it.
+// Limits that acted, and the energy that they exchanged.
 void tell_limits(const Summary& s, Lines& line) {
   if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
   for (const auto& [parameter, limit] : s.active_limits) {
@@ -286,7 +283,6 @@ std::string view_text(const std::optional<ViewSummary>& view) {
          " viewers at most, who may " + (view->may_change ? "change the session, too" : "only look");
 }
 
-// What happened.
 void tell_events(const Summary& s, Lines& line) {
   for (const NoticeSummary& notice : s.notices) {
     const std::string times = notice.times == 1 ? "once" : std::to_string(notice.times) + " times";
@@ -314,7 +310,7 @@ void tell_faults(const Summary& s, Lines& line) {
   }
 }
 
-// What a reader should know of a session without a fault, most pressing first.
+// Remarks on a session without a fault, most important first.
 std::string remarks(const Summary& s) {
   std::string text;
   const auto add = [&text](bool is_so, const std::string& words) {
@@ -334,8 +330,7 @@ std::string remarks(const Summary& s) {
   return text;
 }
 
-// What happened, felt, touched; how true; limits, faults, verdict. What turns and whatever went wrong have lines of
-// their own.
+// The brief summary. Rotation and problems have lines of their own.
 void tell_in_brief(const Summary& s, Lines& line) {
   line("ended", s.end.text.empty() ? format("%.3f s were rendered", s.rendered_time_s) : s.end.text);
   line("apparent mass",
@@ -361,7 +356,7 @@ void tell_in_brief(const Summary& s, Lines& line) {
   tell_faults(s, line);
 }
 
-// Where the mass felt was nearest to the smallest that is stable; nothing where that wasn't looked for.
+// The place where the felt mass was nearest to the smallest stable mass, if that was searched.
 void tell_margin(const Summary& s, Lines& line) {
   const auto share = [](const PassedPoses::Place& place) {
     return place.smallest_stable_mass_kg ? place.felt_mass_kg / *place.smallest_stable_mass_kg : 0.0;

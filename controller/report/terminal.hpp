@@ -1,4 +1,4 @@
-// What a stream's terminal can do.
+// Queries the abilities of a stream's terminal.
 #pragma once
 
 #include <cstdio>
@@ -7,7 +7,7 @@ namespace proxarm::controller {
 
 // Whether `stream` is a terminal that can move its cursor.
 bool can_redraw(std::FILE* stream);
-// Whether it shows colours and its user wants them: not with NO_COLOR set to anything (https://no-color.org).
+// Whether the terminal shows colours and NO_COLOR isn't set (https://no-color.org).
 bool shows_colour(std::FILE* stream);
 
 }  // namespace proxarm::controller

@@ -23,7 +23,7 @@ using description::SetupError;
 
 constexpr std::int64_t rate_measurement_ns = 250'000'000;
 
-// cell.buses.size() if it is none of them: a Modbus line.
+// cell.buses.size() for a Modbus line.
 std::size_t index_of(const description::Cell& cell, const std::string& bus) {
   const auto found = std::find_if(cell.buses.begin(), cell.buses.end(),
                                   [&](const description::BusDescription& b) { return b.name == bus; });
@@ -34,11 +34,11 @@ fieldbus::DriveSettings drive_settings(const description::Cell& cell, const Sess
   fieldbus::DriveSettings drive;
   drive.period_ns = std::llround(settings.period_s * 1e9);
   drive.stop_without_controller(cell.supervision.bus_loss_stop_s);
-  drive.heartbeat_in_operation = false;  // it could cost the last setpoint of a bus its deadline: docs/design.md
+  drive.heartbeat_in_operation = false;  // its frame could delay a bus's last setpoint beyond the deadline:
+                                         // docs/design.md
   return drive;
 }
 
-// Each bus that has drives, once.
 std::vector<DriveBus> drive_buses(const std::vector<fieldbus::DriveSlot>& drives) {
   std::vector<DriveBus> buses;
   for (const fieldbus::DriveSlot& slot : drives) {
@@ -59,9 +59,9 @@ struct Drives {
   std::vector<fieldbus::ModbusDrive*> modbus;
 };
 
-// 6065h and 6066h, the drive's own judgement of what the controller judges as well (drive_monitor.hpp), a little later:
-// a deviation beyond what it lags at its highest speed and what is a fault at once; for longer than the setpoint of a
-// joint that has jammed at that speed takes to brake and to come back.
+// 6065h and 6066h: the drive judges its following error a little later than the controller does (drive_monitor.hpp).
+// Window: the lag at the highest speed plus the deviation that is a fault at once. Time: what the setpoint of a joint
+// that jams at that speed takes to brake and return.
 void watch_following(fieldbus::DriveSettings& settings, const description::DriveDescription& drive,
                      double following_error_rad) {
   const double v = drive.max_speed_rad_per_s, a = drive.max_acceleration_rad_per_s2;
@@ -107,7 +107,7 @@ Drives make_drives(const description::Cell& cell, const SessionSettings& setting
 
 struct Sensor {
   std::unique_ptr<fieldbus::ForceSensor> owned;
-  fieldbus::ModbusSensor* on_line = nullptr;  // the same, or null: on a CAN bus
+  fieldbus::ModbusSensor* on_line = nullptr;  // `owned` itself, or null for a sensor on a CAN bus
 };
 
 Sensor build_sensor(const description::Cell& cell, const description::SensorDescription& sensor) {
@@ -136,8 +136,7 @@ Sensor build_sensor(const description::Cell& cell, const description::SensorDesc
   return {std::make_unique<fieldbus::DescribedSensor>(sensor, settings)};
 }
 
-// One worker and one connection per line. A TCP drive has an address of its own, and thereby a line of its own; units
-// behind a gateway share its.
+// One worker and one connection per line. Each TCP drive has its own line; units behind a gateway share one.
 std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const description::Cell& cell,
                                                                 const std::vector<fieldbus::ModbusDrive*>& drives,
                                                                 fieldbus::ModbusSensor* sensor,
@@ -157,7 +156,7 @@ std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const descriptio
   return lines;
 }
 
-// The tool behind the sensor is felt by itself; (26) gets what is left of the wanted mass.
+// The tool behind the sensor is felt by itself; (26) gets the rest of the wanted mass.
 double proxy_mass(const description::Cell& cell, const SessionSettings& settings) {
   if (settings.mass_kg > cell.tool.mass_kg) return settings.mass_kg - cell.tool.mass_kg;
   throw SetupError({.key = "--mass",
@@ -167,7 +166,7 @@ double proxy_mass(const description::Cell& cell, const SessionSettings& settings
                     .advice = "ask for more mass, or use a lighter tool"});
 }
 
-// Counted from the orientation at the first start, and what is sent leads up to the limits.
+// Relative to the orientation at the first start. The bounds for setpoints lie before the limits by a lead.
 TurnSets turn_sets(const description::Cell& cell) {
   const description::CellLimits& limits = cell.limits;
   TurnSets sets;
@@ -195,8 +194,8 @@ OrientationConfig orientation_config(const description::Cell& cell, const Sessio
   return config;
 }
 
-// Of a rigid tool. What hangs behind the sensor is taken off of the mass as of the inertia, also where none was asked
-// for.
+// For a rigid tool. What hangs behind the sensor is subtracted from the mass and from the inertia, also from the
+// default inertia.
 PoseWorldConfig pose_config(const description::Cell& cell, const SessionSettings& settings) {
   const models::ToolInertia behind = models::tool_inertia(cell.tool);
   PoseWorldConfig config;
@@ -215,7 +214,7 @@ PoseWorldConfig pose_config(const description::Cell& cell, const SessionSettings
   return config;
 }
 
-// The friction of the scene's objects is then that of the tool's 𝒢, and so are their places.
+// Redirects the scene's friction and motion setters to the tool's 𝒢.
 std::unique_ptr<PoseWorld> make_pose_world(const description::Cell& cell, scenes::CompiledScene& scene,
                                            const SessionSettings& settings) {
   std::unique_ptr<models::PoseAlgorithm> g = scenes::compile_rigid(*scene.source, scene.source->tool->shape);
@@ -234,7 +233,7 @@ std::unique_ptr<RenderedTool> make_tool(const description::Cell& cell, scenes::C
                                      orientation_config(cell, settings), models::tool_inertia(cell.tool).about_T_kg_m2);
 }
 
-// What the passivity observer of a tool that turns looks at.
+// The links' motion, for the passivity observer of a tool that turns.
 std::optional<LinkMotion> make_links(const description::Cell& cell, const models::Arm& arm,
                                      const SessionSettings& settings) {
   if (settings.orientation != OrientationMode::free || settings.passivity == Passivity::off) return std::nullopt;
@@ -273,7 +272,7 @@ std::optional<EnablingInput> make_enabling_input(const description::Cell& cell, 
   return EnablingInput(*cell.enabling_input, cell, bus_indices[index_of(cell, cell.enabling_input->bus)]);
 }
 
-// Several of the cell's buses may be on one interface; the controller itself has NMT, SYNC and its heartbeat there.
+// Several of the cell's buses may be on one interface; the controller itself uses NMT, SYNC and its heartbeat there.
 void refuse_shared_identifiers(CycleParts& parts) {
   std::vector<fieldbus::UsedIdentifier> used;
   std::vector<std::string> names;
@@ -310,7 +309,7 @@ std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell
   return build_sensor(cell, sensor).owned;
 }
 
-// Torques for drives that take them, positions for those that don't.
+// Drives in cst take torques, all others positions.
 void require_scheme(const description::Cell& cell, const SessionSettings& settings) {
   const bool torque = settings.scheme == Scheme::impedance;
   for (const description::DriveDescription& drive : cell.drives) {
@@ -370,7 +369,7 @@ std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) 
   for (const fieldbus::DriveSlot& slot : parts.can_drives) {
     if (slot.bus != bus) continue;
     for (const std::uint32_t id : slot.drive->wanted_ids()) ids.push_back(id);
-    // Setpoints: those that come in are another master's (Fault::second_master).
+    // Also setpoints: received ones come from another master (Fault::second_master).
     ids.push_back(fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, slot.drive->node()));
   }
   if (!ids.empty()) {

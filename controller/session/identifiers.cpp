@@ -17,12 +17,11 @@ using description::Cell;
 using description::SensorDescription;
 using description::SetupError;
 
-// An identifier on an interface, and whose it is.
 struct Use {
   std::size_t interface = 0;
   std::uint32_t id = 0;
   std::string owner;
-  std::string key{};  // of the cell's file, by which it is chosen; empty: not by one of its own
+  std::string key{};  // in the cell's file, the key that chooses it; empty: no key does
   std::string bus{};  // of the cell
 };
 
@@ -36,7 +35,7 @@ std::size_t interface_of(const Cell& cell, const BusIndices& indices, const std:
   return no_interface;
 }
 
-// By which the sensor has this identifier. A setting may have the same value and be none: a divisor, say.
+// The key that gives the sensor this identifier. Another setting, such as a divisor, may have the same value by chance.
 std::string sensor_key(const Cell& cell, const SensorDescription& sensor, std::uint32_t id) {
   if (!sensor.described || sensor.described->has_base_id) return "sensor.base_id";
   if (!sensor.described->has_settings) return "sensor.bus";
@@ -46,7 +45,7 @@ std::string sensor_key(const Cell& cell, const SensorDescription& sensor, std::u
   return "sensor.settings." + std::find_if(settings.begin(), settings.end(), is_it)->name;
 }
 
-// The sensor itself refuses NMT's and SYNC's, but doesn't know which of its settings has chosen that.
+// The sensor refuses the identifiers of NMT and SYNC, but doesn't know which of its settings chose them.
 std::string refused_key(const Cell& cell, const SensorDescription& sensor, const std::string& told) {
   if (told != "sensor.settings") return told;
   for (const std::uint32_t id : sensor.described->wire_ids(cell.sensor.base_id)) {
@@ -55,7 +54,7 @@ std::string refused_key(const Cell& cell, const SensorDescription& sensor, const
   return told;
 }
 
-// The sensor's own refusals, with where in the cell's file its key stands.
+// The sensor's identifiers; its refusals get the line of their key in the cell's file.
 std::vector<std::uint32_t> sensor_identifiers(const Cell& cell, const SensorDescription& sensor) {
   try {
     return make_sensor(cell, sensor)->used_ids();
@@ -128,7 +127,7 @@ void require_own_identifiers(const Cell& cell, const SensorDescription& sensor, 
   add_controller_and_drives(cell, bus_indices, uses);
   if (cell.enabling_input && !settings.without_enabling_input) add_enabling_input(cell, bus_indices, uses);
   add_sensor(cell, sensor, bus_indices, uses);
-  // What has a key of its own comes last, and is told.
+  // Uses with a key of their own come last; the error names this key.
   for (std::size_t b = 0; b < uses.size(); ++b) {
     for (std::size_t a = 0; a < b && !uses[b].key.empty(); ++a) {
       const bool same = uses[a].interface == uses[b].interface && uses[a].id == uses[b].id;

@@ -1,4 +1,4 @@
-// Which identifiers the devices of a cell have on CAN: judged by the files alone, before a bus is opened.
+// Checks the CAN identifiers of a cell's devices from the files alone, before a bus is opened.
 #pragma once
 
 #include "controller/session/bring_up.hpp"
@@ -7,9 +7,9 @@
 
 namespace proxarm::controller {
 
-// Throws SetupError with the cell's file, line and key where the sensor can't be had as the cell has it, or where the
-// sensor or the enabling input has an identifier of the controller, of a drive or of the other on one bus. Drives have
-// theirs by their nodes. `bus_indices` says which of the cell's buses share an interface.
+// Throws SetupError with the cell's file, line and key if the cell's choices for the sensor are invalid, or if sensor
+// or enabling input share an identifier on one bus with the controller, a drive or each other. `bus_indices` tells
+// which of the cell's buses share an interface.
 void require_own_identifiers(const description::Cell& cell, const description::SensorDescription& sensor,
                              const SessionSettings& settings, const BusIndices& bus_indices);
 

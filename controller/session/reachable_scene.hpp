@@ -1,4 +1,4 @@
-// A scene as an arm can render it.
+// Restricts a scene to what an arm can render.
 #pragma once
 
 #include "models/description/cell.hpp"
@@ -6,8 +6,8 @@
 
 namespace proxarm::controller {
 
-// Where there is nothing to touch, the arm's tool may go wherever it can: free space becomes the line or plane of an
-// arm that can't move in all directions. Any other scene stays as it is written.
+// An empty scene becomes the line or plane that the tool can reach, if the arm can't move in all directions. Any other
+// scene is returned unchanged.
 scenes::Scene reachable_scene(scenes::Scene scene, const description::Cell& cell);
 
 }  // namespace proxarm::controller

@@ -7,7 +7,7 @@ namespace proxarm::controller {
 
 namespace {
 
-// Asks for the stop when the session has lasted long enough, and knows afterwards why it ended.
+// Requests the stop when the session has lasted long enough, and knows why it ended.
 class Ending {
  public:
   explicit Ending(const SessionLength& length)
@@ -27,7 +27,7 @@ class Ending {
     }
   }
 
-  // After the last cycle. What stops without a fault and without being asked to is a hold that lasted too long.
+  // After the last cycle. A stop without fault and without request is a hold that lasted too long.
   [[nodiscard]] SessionEnd reason(const Cycle& cycle) const {
     if (cycle.supervisor().faulted()) return SessionEnd::fault;
     return cycle.stop_requested() ? stopped_for_ : SessionEnd::hold_expired;
@@ -55,7 +55,7 @@ SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, const Sess
   std::uint32_t overruns_in_a_row = 0;
   std::int64_t t_k_ns = network.now_ns() + cycle.period_ns();
   const auto periods_since = [&](std::int64_t time_ns) { return (network.now_ns() - time_ns) / cycle.period_ns(); };
-  // A cycle that doesn't take place is as bad as one that is late.
+  // A skipped cycle counts like a late one.
   const auto skip = [&](std::int64_t periods) {
     tally.skipped += static_cast<std::uint64_t>(periods);
     t_k_ns += periods * cycle.period_ns();
@@ -64,7 +64,7 @@ SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, const Sess
   };
   while (cycle.supervisor().phase() != Phase::done) {
     network.sleep_until(t_k_ns);
-    // Whole periods that went by asleep: the process was suspended, or the machine had no time for it.
+    // Whole periods without a cycle: the process was suspended, or didn't get the processor.
     if (const std::int64_t missed = periods_since(t_k_ns); missed > 0) {
       ++tally.overruns;
       skip(missed);
@@ -82,7 +82,7 @@ SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, const Sess
       ++overruns_in_a_row;
       skip(periods_since(t_k_ns));
     } else {
-      // A simulation that keeps pace with the clock waits for a late machine; on a bus the next cycle would be due.
+      // A simulation that keeps pace with the clock waits for a late host; on a bus the next cycle would be due.
       const bool waited_for = network.now_ns() + network.behind_ns() > t_k_ns;
       if (waited_for) ++tally.overruns;
       overruns_in_a_row = 0;

@@ -1,10 +1,9 @@
-// The loop around the cycle: wakes at t_k, runs it, looks after lateness, ends after the stop.
+// The loop around the cycle: wakes at t_k, runs the cycle, handles lateness, ends after the stop.
 //
-// On time: t_{k+1} = t_k + T. A cycle that ends after the next t_k is an overrun; the periods that it missed
-// are skipped, never caught up in a burst, and the drives see a longer step instead. So are periods that the loop slept
-// through, as a suspended process does. Late and skipped cycles in a row are counted together: Fault::overrun.
-// Simulated time that keeps pace with the clock waits for late cycles, up to 0.2 s (SimulatedCanNetwork): they are
-// counted as overruns, but none is skipped, and they are no fault.
+// t_{k+1} = t_k + T. A cycle that ends after the next t_k is an overrun: the missed periods are skipped, never caught
+// up in a burst, and the drives see a longer step. Periods that a suspended process sleeps through are skipped, too.
+// Late and skipped cycles in a row raise Fault::overrun. Simulated time at the pace of the clock waits up to 0.2 s for
+// a late cycle (SimulatedCanNetwork): this counts as an overrun, but nothing is skipped and no fault is raised.
 #pragma once
 
 #include <cstdint>
@@ -17,36 +16,35 @@
 namespace proxarm::controller {
 
 struct SessionHooks {
-  std::function<void(std::int64_t t_k_ns)> before_cycle;  // at t_k, before SYNC: a simulation's truth is read here
-  std::function<void()> after_cycle;                      // in the slack: drain the records here, or in another thread
+  std::function<void(std::int64_t t_k_ns)> before_cycle;  // at t_k, before SYNC: here a simulation's true state is read
+  std::function<void()> after_cycle;                      // after the cycle: drain the records here, or in another
+                                                          // thread
 };
 
-// Why a session came to its end.
 enum class SessionEnd : std::uint8_t {
-  duration,         // it rendered for as long as was wanted
+  duration,         // the wanted rendering time is over
   asked,            // request_stop() from outside the loop: a signal
-  hold_expired,     // a hold that no fault caused lasted for hold_s, and nobody ended it
-  release_expired,  // the arm followed the hand for `longest_release_s`, and nobody was left to end it
+  hold_expired,     // a hold without a fault lasted for hold_s
+  release_expired,  // the arm followed the hand for `longest_release_s` without an order
   fault,            // the supervisor's report says which
 };
 
-// How long a session lasts.
 struct SessionLength {
   double duration_s;  // of rendering
-  // How long a release (Phase::freeing) may last once the script has no order left. Only an order or the enabling
-  // input ends a release, so a session that takes orders from nowhere else would go on for good.
+  // The longest release (Phase::freeing) once the script has no order left, s. Only an order or the enabling input ends
+  // a release, so without another source of orders the session would never end.
   double longest_release_s = std::numeric_limits<double>::infinity();
 };
 
 struct SessionTally {
   SessionEnd end = SessionEnd::fault;
   std::uint64_t cycles = 0;
-  std::uint64_t overruns = 0;  // cycles that ended after the next was due, and gaps that were slept through
+  std::uint64_t overruns = 0;  // cycles that ended after the next was due, and times without cycles (process suspended)
   std::uint64_t skipped = 0;   // periods without a cycle
-  PageFaults page_faults;      // of the loop's thread, after the first cycle
+  PageFaults page_faults;      // of the loop's thread, from the second cycle on
 };
 
-// Runs from the first cycle until the drives are off again; after `length` it asks for the stop.
+// Runs from the first cycle until the drives are off again; requests the stop after `length`.
 SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, const SessionLength& length,
                          const SessionHooks& hooks);
 

@@ -11,8 +11,8 @@ using models::JointVector;
 namespace {
 
 constexpr int poses = 1000;
-// Of a joint's range that one walk uphill tries, and how often all joints have their turn. A weight is a sine of each
-// angle: a step of a hundredth of a turn misses its top by 0.2 %.
+// Tried places in a joint's range, and rounds over all joints. A weight is a sine of each angle: steps of a hundredth
+// of a turn miss its maximum by 0.2 %.
 constexpr int places = 100, turns = 3;
 
 bool inside(const description::CellLimits& limits, const models::Vec3& point_W) {

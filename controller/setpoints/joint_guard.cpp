@@ -11,8 +11,7 @@ using models::JointVector;
 
 namespace {
 
-// A double angle is rounded to some 1e-16 rad. An acceleration computed from three of them is off by 1e-9 rad/s² at 1
-// kHz.
+// A double angle is rounded to some 1e-16 rad; an acceleration from three of them is off by 1e-9 rad/s² at 1 kHz.
 constexpr double lag_tolerance_rad = 1e-13;
 
 }  // namespace
@@ -53,7 +52,7 @@ ActiveLimits JointGuard::step(const JointVector& wanted_rad) noexcept {
     }
     const double u =
         choose_speed(joint, wanted_u, lag, theta, speed_rad_per_s_[i], active, static_cast<std::uint8_t>(1u << i));
-    // A wanted setpoint that no limit touches is passed on to the bit.
+    // A wanted setpoint within all limits passes to the bit.
     target_rad_[i] = u == wanted_u && std::abs(lag) <= lag_tolerance_rad ? wanted : theta + u * T;
     speed_rad_per_s_[i] = u;
     wanted_k1_rad_[i] = wanted;
@@ -73,7 +72,7 @@ double JointGuard::choose_speed(const Joint& joint, double wanted_u, double lag,
   cap(-joint.speed_rad_per_s, joint.speed_rad_per_s, Limit::joint_speed);
   cap(-approach_speed(theta - joint.lower_rad, a, T), approach_speed(joint.upper_rad - theta, a, T),
       Limit::joint_range);
-  // Comes after the range, and so has the last word; the two contradict each other by rounding at most.
+  // Comes after the range and has the last word; the two conflict by rounding at most.
   cap(u_k1 - a * T, u_k1 + a * T, Limit::joint_acceleration);
   if (std::abs(lag) > lag_tolerance_rad && active.kinds == 0) active.set(Limit::joint_acceleration, bit);
   return u;

@@ -1,13 +1,13 @@
-// Keeps each setpoint within its joint's range, speed and acceleration, whatever is wanted. The tool's guard
-// (tool_guard.hpp) comes after it, keeps the same bounds of the joints, and has the last word.
+// Keeps each setpoint within its joint's range, speed and acceleration. The tool guard (tool_guard.hpp) comes after it,
+// keeps the same joint bounds and has the last word.
 //
 // Per joint, with θ₁ and u₁ the last setpoint and its speed, T the period, a and v the joint's limits:
 //   |u − u₁| ≤ aT,   |u| ≤ v,   u ≤ c(θ_max − θ₁),   −u ≤ c(θ₁ − θ_min),   θ = θ₁ + uT
-//   c(d) = −aT + √(a²T² + 2ad): the fastest approach from which braking at a ends within d (limits/braking.hpp)
-// These bounds never contradict each other: if Tu + u²/(2a) ≤ d, braking (u' = u − aT) keeps Tu' + u'²/(2a) ≤ d − Tu.
+//   c(d) = −aT + √(a²T² + 2ad): highest approach speed from which braking at a ends within d (limits/braking.hpp)
+// These bounds never conflict: if Tu + u²/(2a) ≤ d, braking (u' = u − aT) keeps Tu' + u'²/(2a) ≤ d − Tu.
 //
-// A wanted setpoint within all of these bounds passes unchanged. Otherwise the setpoint lags and catches up
-// time-optimally: with the speed of the wanted setpoint, plus c(lag) towards it. Neither allocates, locks nor throws.
+// A wanted setpoint within all bounds passes unchanged. Otherwise the setpoint lags and catches up in minimum time:
+// with the wanted setpoint's speed, plus c(lag) towards it. Neither allocates, locks nor throws.
 #pragma once
 
 #include <cstdint>
@@ -27,23 +27,22 @@ class JointGuard {
   void set_period(double period_s) noexcept { period_s_ = period_s; }
   // Starts at rest at these angles.
   void start(const models::JointVector& target_rad) noexcept;
-  // One period. An angle that isn't finite is replaced by the last setpoint. Returns the limits that were active.
+  // One period. The last setpoint replaces an angle that isn't finite. Returns the active limits.
   ActiveLimits step(const models::JointVector& wanted_rad) noexcept;
-  // Takes over what another guard has made of this period's setpoints. Precondition: they are within each joint's speed
-  // and acceleration.
+  // Takes over this period's setpoints from another guard. Precondition: they keep each joint's speed and acceleration.
   void settle(const models::JointVector& target_rad, const models::JointVector& speed_rad_per_s) noexcept {
     target_rad_ = target_rad;
     speed_rad_per_s_ = speed_rad_per_s;
   }
-  // Drops the lag: setpoints go on from where they are. The joints in `but_not` (bits) keep their target, since they
-  // are on their way to it and brake before it.
+  // Drops the lag: setpoints continue from their present angles. The joints in `but_not` (bits) keep their target; they
+  // are moving there and brake before it.
   void follow_from_here(std::uint8_t but_not = 0) noexcept;
 
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return target_rad_; }
   [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }
-  // By how much each setpoint is behind what was wanted.
+  // Distance of each setpoint behind the wanted one.
   [[nodiscard]] models::JointVector lag_rad() const noexcept { return wanted_k1_rad_ - target_rad_; }
-  // Whether a joint's limits hold its setpoint back from what was wanted.
+  // Whether a joint's limits hold its setpoint back.
   [[nodiscard]] bool lags() const noexcept;
   [[nodiscard]] bool at_rest() const noexcept { return speed_rad_per_s_.cwiseAbs().maxCoeff() < 1e-9; }
   void archive(fieldbus::StateArchive& state) noexcept { state(target_rad_, speed_rad_per_s_, wanted_k1_rad_); }

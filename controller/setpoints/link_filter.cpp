@@ -38,7 +38,7 @@ JointVector LinkFilter::step(const JointVector& wanted_rad) noexcept {
   return omega * omega * (wanted_rad - rad_) - 2.0 * omega * rad_per_s_;
 }
 
-// From ė(T) of step(), whose c is v − ωd for the input q_f + d: (ė(T) − v)/T = a where
+// From ė(T) of step(), where c is v − ωd for the input q_f + d: (ė(T) − v)/T = a if
 //   d = (v (exp(ωT) − 1 + ωT) + aT exp(ωT)) / (ω²T)
 JointVector LinkFilter::coasting_rad() const noexcept {
   if (!filters()) return rad_ + period_s_ * rad_per_s_;

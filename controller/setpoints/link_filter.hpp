@@ -1,4 +1,4 @@
-// The critically damped filter between the links' wanted angles and what is commanded (elastic_setpoint.hpp):
+// The critically damped filter from wanted to commanded link angles (elastic_setpoint.hpp):
 //
 //   q̈_f = ω²(q − q_f) − 2ω q̇_f
 // exact for an input q that is constant over the period. With ω = 0 there is no filter: q_f = q. Neither allocates,
@@ -15,19 +15,19 @@ class LinkFilter {
   LinkFilter(double bandwidth_Hz, double period_s) noexcept;
 
   void set_period(double period_s) noexcept;
-  // Goes on from these angles and speeds, and discards what had accumulated.
+  // Continues from these angles and speeds; discards the filter's state.
   void resume(const models::JointVector& rad, const models::JointVector& rad_per_s) noexcept;
   void start(const models::JointVector& rad) noexcept { resume(rad, models::JointVector::Zero(rad.size())); }
-  // One period towards these angles. Returns the acceleration at its end, rad/s².
+  // One period towards these angles. Returns the acceleration at the end of the period, rad/s².
   models::JointVector step(const models::JointVector& wanted_rad) noexcept;
 
   [[nodiscard]] bool filters() const noexcept { return omega_rad_per_s_ > 0.0; }
   [[nodiscard]] const models::JointVector& rad() const noexcept { return rad_; }
   [[nodiscard]] const models::JointVector& rad_per_s() const noexcept { return rad_per_s_; }
-  // How far the input is ahead of the output at a constant speed: 2/ω, in seconds; 0 without a filter.
+  // Lead of the input over the output at constant speed: 2/ω in seconds; 0 without a filter.
   [[nodiscard]] double lead_s() const noexcept { return filters() ? 2.0 / omega_rad_per_s_ : 0.0; }
-  // The input for which the output keeps its speed over the next period, and by how much another input is off from that
-  // for each rad/s² of mean acceleration.
+  // coasting_rad(): input for which the output keeps its speed over the next period. input_s2(): distance of another
+  // input from it, per rad/s² of mean acceleration.
   [[nodiscard]] models::JointVector coasting_rad() const noexcept;
   [[nodiscard]] double input_s2() const noexcept {
     return filters() ? 1.0 / (decay_ * omega_rad_per_s_ * omega_rad_per_s_) : period_s_ * period_s_;

@@ -1,12 +1,13 @@
-// The interval of angles in which a drive that follows its setpoints must be, whatever filter its control loop is.
+// Computes the interval of angles in which a drive that follows its setpoints must be, for any filter in its control
+// loop.
 //
-// A drive's position is a weighted mean of the setpoints that it was sent: it latches them at SYNC, interpolates, and
-// its loop lags behind them. Its answer is delayed by as much again. With s(k) the setpoint, T the period and τ the
-// time of all these delays together (following_lag_s()), the envelope is
+// A drive's position is a weighted mean of its setpoints: it latches them at SYNC, interpolates, and its loop lags. Its
+// answer is delayed as well. With the setpoint s(k), the period T and the sum τ of all these delays
+// (following_lag_s()), the envelope is
 //   h(k) = max(s(k), s(k) + (1 − T/τ)(h(k−1) − s(k))),   l(k) the same with min
-// Both bounds forget a former setpoint with the time constant τ, so that l ≤ θ ≤ h for a drive that is behind by up to
-// τ at a constant speed. While a drive accelerates at a from rest, a pure delay of τ puts it outside by up to 0.13 aτ²,
-// which is 0.2 mrad at 30 rad/s² and 1 ms.
+// Both bounds forget old setpoints with the time constant τ, so that l ≤ θ ≤ h for a drive with a delay of up to τ at
+// constant speed. While a drive accelerates at a from rest, a pure delay of τ puts it outside by up to 0.13 aτ²: 0.2
+// mrad at 30 rad/s² and 1 ms.
 #pragma once
 
 #include <vector>
@@ -17,12 +18,12 @@
 
 namespace proxarm::controller {
 
-// τ: 5 T on CAN. On a Modbus line two exchanges are added, since both the setpoint and the answer wait for one, and the
-// drive's own lag.
+// τ: 5 T on CAN, plus the drive's own lag. On a Modbus line plus two exchanges, as setpoint and answer each wait for
+// one.
 [[nodiscard]] double following_lag_s(const description::DriveDescription& drive, double period_s,
                                      double feedback_period_s) noexcept;
 
-// The lag of the slowest drive's position loop: 1/(2π f) of its bandwidth f.
+// Lag of the slowest position loop: 1/(2π f) for its bandwidth f.
 [[nodiscard]] double slowest_drive_lag_s(const std::vector<description::DriveDescription>& drives) noexcept;
 
 class SetpointEnvelope {
@@ -35,9 +36,9 @@ class SetpointEnvelope {
 
   [[nodiscard]] double low_rad(Eigen::Index joint) const noexcept { return low_rad_[joint]; }
   [[nodiscard]] double high_rad(Eigen::Index joint) const noexcept { return high_rad_[joint]; }
-  // A drive that from now on brakes by itself ends further down and further up by as much as this.
+  // Widens the envelope for a drive that from now on brakes by itself.
   void widen(Eigen::Index joint, double down_rad, double up_rad) noexcept;
-  // How far an angle is above the upper bound (positive) or below the lower one (negative); 0 between them.
+  // Distance of an angle above the upper bound (positive) or below the lower (negative); 0 between them.
   [[nodiscard]] double outside_rad(Eigen::Index joint, double angle_rad) const noexcept;
   void archive(fieldbus::StateArchive& state) noexcept { state(low_rad_, high_rad_); }
 

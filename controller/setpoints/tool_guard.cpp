@@ -16,30 +16,28 @@ namespace {
 
 // 2⁻¹⁰ of a step is 0.5 µm at 0.5 m/s and 1 ms.
 constexpr int bisections = 10;
-// Fixed-point iteration: the gears' twist follows from the links' angles, and these from the twist. Each round reduces
-// the error fifty times. One round from the extrapolated twist leaves at most 2e-8 rad at usual accelerations; three
-// rounds from it leave 1e-6 rad at the end of the longest braking distance.
+// Rounds of a fixed-point iteration: the gears' twist follows from the link angles, and these from the twist. Each
+// round reduces the error fifty times. One round from the extrapolated twist leaves at most 2e-8 rad at usual
+// accelerations; three rounds leave 1e-6 rad at the end of the longest braking distance.
 constexpr int quick_rounds = 1, exact_rounds = 3;
-// The share of the speed limits that passes. Drives overshoot by up to 7 % where the guard acts, and the arm must stay
-// within 5 % of its limit. The quick test is stricter and leaves cases close to the limit to the exact one.
+// Share of the speed limits that passes. Drives overshoot by up to 7 % when the guard acts, and the arm must stay
+// within 5 % of its limit. The quick test is stricter and leaves close cases to the exact one.
 constexpr double exact_share = 0.99, quick_share = 0.985, quick_way_m = 1e-4;
-// Rounding of positions.
 constexpr double touching_m = 1e-10;
-// Of orientations: setpoints are rounded to counts of some 1e-7 rad. A period's turn has no more than the digits of the
+// Tolerances of orientations: setpoints are rounded to counts of some 1e-7 rad; a period's turning is as exact as the
 // kinematics.
 constexpr double turned_rad = 1e-6, turn_rounding_rad = 1e-9;
-// While the proxy's limits stop the tool at a border, its gears twist, and setpoints reach some micrometres beyond the
-// border. The guard tolerates this much, so that it doesn't act where the proxy's limits do. It is a fifth of the 0.1
-// mm that are promised. With more, the border would feel soft; with less, it would be felt twice.
+// When the proxy's limits stop the tool at a border, gears twist, and setpoints go some micrometres beyond the border.
+// The guard tolerates this much, so that it doesn't act together with the proxy's limits. It is a fifth of the promised
+// 0.1 mm. With more, the border would feel soft; with less, it would be felt twice.
 constexpr double twist_m = 2e-5;
-// What of the motors' lead is taken off where borders are judged, along each axis: with twist_m this keeps setpoints
-// within the 0.1 mm that are promised.
+// Largest correction for the motors' lead at borders, along each axis. With twist_m it keeps setpoints within the
+// promised 0.1 mm.
 constexpr double most_lead_m = 6e-5;
-// The path between two points on the right side of a border may bulge beyond it by half of the 0.1 mm that are
-// promised.
+// The path between two points inside a border may bulge out by half of the promised 0.1 mm.
 constexpr double bulge_m = 5e-5;
-// Applies while the tool is slowed down temporarily. Motors whose gears are bent may then be faster for a moment: up to
-// 1.42 times when an arm that was released in contact begins to move, and more at order 2.
+// Factor on a temporary speed limit of the tool. Motors with bent gears may be faster for a moment: up to 1.42 times
+// when an arm released in contact begins to move, and more at order 2.
 constexpr double slowed_share = 1.8;
 
 double depth_in(const Vec3& p, const description::BoxDescription& box) noexcept {
@@ -51,7 +49,7 @@ double depth_in(const Vec3& p, const description::BoxDescription& box) noexcept 
   return depth;
 }
 
-// How deep in a keep-out box the gears' twist may put a setpoint; in a thin box, at most a quarter of its thickness.
+// Allowed depth of a setpoint in a keep-out box by gear twist; in a thin box, a quarter of its thickness.
 double twist_in(const description::BoxDescription& box) noexcept {
   double thinnest = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < 3; ++k) thinnest = std::min(thinnest, box.max_m[k] - box.min_m[k]);
@@ -101,7 +99,7 @@ ToolGuard::ToolGuard(const models::Arm& arm, const std::vector<description::Driv
 void ToolGuard::start(const JointVector& target_rad) noexcept {
   target_rad_ = target_rad;
   speed_rad_per_s_ = JointVector::Zero(target_rad.size());
-  points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer joints, and all are archived
+  points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer joints, but all are archived
   arm_->points(arm_->link_from_motor(target_rad), points_);
   twist_k2_rad_ = points_.twist_rad;
   lead_W_.setZero();
@@ -125,7 +123,7 @@ ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_p
   return active;
 }
 
-// The iteration starts from the twist that is extrapolated from the last two periods.
+// The iteration starts from the twist extrapolated from the last two periods.
 void ToolGuard::evaluate(const JointVector& theta, int rounds, ArmPoints& out) const noexcept {
   JointVector twist = 2.0 * points_.twist_rad - twist_k2_rad_;
   for (int round = 0; round < rounds; ++round) {
@@ -143,7 +141,7 @@ double ToolGuard::bend(const JointVector& d) const noexcept {
   return size.dot(curvature_.lazyProduct(size));
 }
 
-// How many steps as this one the braking distance is: the sum of 1 − kT/t over the periods k = 1 … t/T.
+// Braking distance in steps of this size: the sum of 1 − kT/t over the periods k = 1 … t/T.
 double ToolGuard::braking_steps(double t) const noexcept {
   const double T = period_s_, steps = std::floor(t / T);
   return steps < 1.0 ? 0.0 : steps - 0.5 * steps * (steps + 1.0) * T / t;
@@ -189,9 +187,9 @@ Eigen::Quaterniond ToolGuard::orientation(const JointVector& link_rad) const noe
   return Eigen::Quaterniond(arm_->tool_pose(link_rad).linear()).normalized();
 }
 
-// On the way to rest the tool comes on towards a limit as in this step; what motors lead the links by then comes back.
-// While the tool turns along a limit, braking in a straight line of the joints leaves it by a few milliradians, which
-// only a stop does.
+// On the way to rest the tool approaches a limit at the speed of this step; the motors' lead then vanishes. While the
+// tool turns along a limit, straight braking in joint space leaves the limit by a few milliradians; this happens only
+// in a stop.
 void ToolGuard::judge_turning(const JointVector& theta, const ArmPoints& at, const Limits& limit, double more_steps,
                               ActiveLimits& out) const noexcept {
   const TurnSets& turn = *limit.turn;
@@ -236,7 +234,7 @@ void ToolGuard::judge_borders(const Vec3& at, const Vec3& rest, double step_bend
   }
 }
 
-// Braking together is slower than a joint brakes by itself before the end of its range.
+// Braking together is weaker than a single joint's braking before the end of its range.
 JointVector ToolGuard::within_ranges(JointVector theta) const noexcept {
   const double T = period_s_;
   for (Eigen::Index i = 0; i < theta.size(); ++i) {

@@ -1,4 +1,4 @@
-// How far proxy and tool are from the nearest surface, which only the scene knows and the cycle leaves out.
+// Computes the distances of proxy and tool to the nearest surface, which the cycle leaves out.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,15 @@
 
 namespace proxarm::controller {
 
-// Sets both clearances of a record, after so much rendering. The tool is where the
-// simulation's truth has it, else where the encoders do. A point's contacts get their places, forces (place_contacts())
-// and gaps, in an elastic layer from its surface, so below 0; the gap of an object that is driven stays 0, since the
-// scene's file doesn't say where it is.
-// Precondition: `clearances` are those of the scene.
+// Sets both clearances of a record at this time of rendering, and the places, forces (place_contacts()) and gaps of a
+// point's contacts. The tool's place is the simulation's true one if recorded, else by the encoders. Gaps are below 0
+// in an elastic layer; a driven object's gap stays 0, since the scene's file doesn't say where it is. Precondition:
+// `clearances` belong to `scene`.
 void add_clearances(CycleRecord& record, const scenes::Scene& scene, const scenes::Clearances& clearances,
                     std::int64_t rendered_ns);
 
-// The same of a rigid tool, by the poses of proxy and tool. Without the simulation's truth the tool is taken to have
-// the proxy's orientation: the record has no other.
+// The same for a rigid tool, by the poses of proxy and tool. Without the simulation's true pose, the tool is assumed to
+// have the proxy's orientation, the only one in the record.
 void add_clearances(CycleRecord& record, const models::PoseAlgorithm& rigid, std::int64_t rendered_ns);
 
 }  // namespace proxarm::controller

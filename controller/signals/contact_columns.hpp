@@ -1,5 +1,4 @@
-// The contacts of a record (contacts.csv, contacts.bin): a row for each contact of each cycle, none for a cycle
-// without.
+// The columns of a record's contacts (contacts.csv, contacts.bin): a row for each contact of each cycle.
 #pragma once
 
 #include <string>
@@ -12,12 +11,12 @@ namespace proxarm::controller {
 
 [[nodiscard]] const std::vector<SignalColumn>& contact_columns();
 
-// About the rendered point, in W, Nm.
+// About the rendered point.
 [[nodiscard]] Triple contact_torque_W_Nm(const CycleRecord& record, const RecordedContact& contact) noexcept;
 
-// The row of one of a record's contacts as text, without its end. Precondition: index < record.recorded_contacts().
+// Appends one contact's row as text, without its end. Precondition: index < record.recorded_contacts().
 void append_contact(std::string& row, const CycleRecord& record, std::size_t index);
-// The same as numbers, each `apart` places behind the one before.
+// The same as numbers, at a spacing of `apart` values.
 void store_contact(double* first, std::size_t apart, const CycleRecord& record, std::size_t index);
 
 }  // namespace proxarm::controller

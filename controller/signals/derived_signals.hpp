@@ -1,5 +1,5 @@
-// What a record has of a cycle beside what the cycle knows of itself: joint angles and torques with their units, and
-// the tool's orientation. Not for the cycle: it takes some microseconds.
+// Signals derived from a cycle's record: joint angles and torques in SI units, and the tool's orientation. Not for the
+// cycle: takes some microseconds.
 #pragma once
 
 #include "controller/signals/signal_columns.hpp"
@@ -10,10 +10,10 @@ namespace proxarm::controller {
 
 class SignalDeriver {
  public:
-  // The cell must outlive it. Throws SetupError.
+  // Precondition: the cell outlives this object. Throws SetupError.
   explicit SignalDeriver(const description::Cell& cell);
   [[nodiscard]] DerivedSignals derive(const CycleRecord& record) const;
-  // The links' angles, by the encoders.
+  // The links' angles by the encoders.
   [[nodiscard]] models::JointVector link_rad(const CycleRecord& record) const;
   [[nodiscard]] const models::Arm& arm() const noexcept { return arm_; }
 

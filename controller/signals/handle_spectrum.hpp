@@ -1,14 +1,13 @@
-// How the handle vibrates: amplitude by frequency, in third-octave bands from 10 to 400 Hz.
+// Measures the handle's vibration: amplitude by frequency, in third-octave bands from 10 to 400 Hz.
 //
-// The bands are those of IEC 61260-1 (base ten): centres 10^(n/10) Hz, n = 10 … 26, edges 10^(±1/20) of them. A band
-// has the amplitude of the sine that vibrates as strongly as all that is in it, so a sine has its own amplitude
-// wherever in the band it is, and noise doesn't depend on how long it is listened to:
+// The bands are those of IEC 61260-1 (base ten): centres 10^(n/10) Hz, n = 10 … 26, edges at 10^(±1/20) of them. A
+// band's amplitude is that of a sine with the same power. So a sine has its own amplitude anywhere in the band, and
+// noise doesn't depend on the length of the measurement:
 //   A² = Σ |2 X(f)/Σw|² / 1.5   over the band's lines and the three axes
-// X is the Fourier transform of the place over the last second with Hann's window w, whose noise bandwidth is 1.5
-// lines (Harris, Proceedings of the IEEE 66, 1978). It is taken of the second difference of places and divided by that
-// difference's own transfer, 2 (1 − cos ωT): where a hand leads the tool by hundreds of millimetres a second the window
-// alone would smear that over the bands. A motion along a circle of radius r counts √2 r.
-// Bands that reach beyond half the rate of the cycle are left out. Allocates; not for the cycle.
+// X is the Fourier transform of the position over the last second with Hann's window w, whose noise bandwidth is 1.5
+// lines (Harris, Proceedings of the IEEE 66, 1978). It is computed from second differences, divided by their transfer
+// function 2 (1 − cos ωT): with the window alone, a fast led motion would smear over the bands. A motion along a circle
+// of radius r counts √2 r. Bands beyond half the cycle's rate are left out. Allocates; not for the cycle.
 #pragma once
 
 #include <cstddef>
@@ -26,16 +25,16 @@ class HandleSpectrum {
   struct Band {
     double centre_Hz = 0.0;
     double amplitude_m = 0.0;
-    double frequency_Hz = 0.0;  // of what is in it: the mean of its lines, weighted by the power of the acceleration
+    double frequency_Hz = 0.0;  // mean frequency of the band's lines, weighted by the acceleration's power
   };
 
-  // The next place of the handle. Places that don't follow each other by one period begin anew.
+  // Adds the handle's next position. If it doesn't follow the last one by one period, the measurement begins anew.
   void add(double time_s, double period_s, const models::Vec3& place_m);
-  // The next cycle: of rendering its tool, where it truly is where that is known, else by the encoders.
+  // Adds the tool's position of a rendering cycle: the true one if recorded, else by the encoders.
   void add(const CycleRecord& record);
   void reset() noexcept { places_.clear(); }
 
-  // Of the last second; empty before there is one.
+  // Over the last second; empty before the first second is complete.
   [[nodiscard]] std::vector<Band> bands() const;
 
  private:
@@ -43,7 +42,7 @@ class HandleSpectrum {
   [[nodiscard]] std::vector<models::Vec3> windowed_differences() const;
 
   double period_s_ = 0.0, last_s_ = 0.0;
-  std::vector<models::Vec3> places_;  // at most twice as many as the window has
+  std::vector<models::Vec3> places_;  // at most twice the window's samples
 };
 
 }  // namespace proxarm::controller

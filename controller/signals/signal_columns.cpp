@@ -38,7 +38,7 @@ void put_first(auto& row, const CycleRecord& r, std::size_t axes, bool with_trut
   }
 }
 
-// What came after the first version of the record.
+// Columns added after the first version of the record.
 void put_more(auto& row, const CycleRecord& r, std::size_t axes, bool with_truth, const DerivedSignals& derived) {
   for (const Fault fault : {r.fault, r.held_for}) {
     row.word(fault == Fault::none ? "" : fault_name(fault), static_cast<int>(fault));
@@ -167,7 +167,6 @@ void add_more(Columns& columns, const std::vector<std::string>& axis_names, bool
   columns.add_vector("true_acceleration_W", "m/s²", "W", "of the simulated tool");
 }
 
-// What came with tools that turn.
 void add_turning(Columns& columns, bool with_truth) {
   columns.add_orientation("proxy_W", "orientation of the proxy");
   columns.add_vector("contact_torque_W", "Nm", "W", "the world's torque on the proxy, about the rendered point");
@@ -227,7 +226,7 @@ void append_stored(std::string& text, Form form, const std::vector<std::string>&
   const auto whole = static_cast<std::int64_t>(value);
   if (form == Form::integer) return append_number(text, whole);
   if (form == Form::word) {
-    // Of a damaged file; phase_name says the same of what is no phase.
+    // Only in a damaged file; phase_name() has the same text for invalid phases.
     text += whole >= 0 && static_cast<std::size_t>(whole) < words.size() ? words[static_cast<std::size_t>(whole)] : "?";
     return;
   }

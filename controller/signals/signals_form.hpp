@@ -1,11 +1,11 @@
-// How a record keeps its tables.
+// The file format of a record's tables.
 #pragma once
 
 #include <cstdint>
 
 namespace proxarm::controller {
 
-// Signals and contacts: as text; as numbers; as numbers that are packed, and frames.log with them.
+// Signals and contacts as text, as numbers, or as packed numbers; packed also applies to frames.log.
 enum class SignalsForm : std::uint8_t { csv, binary, packed };
 
 }  // namespace proxarm::controller

@@ -1,5 +1,5 @@
-// How a row of a table is written, as text (.csv) or as numbers (.bin): the same calls for both, one for each column.
-// For the sources of this folder.
+// Writes a table's row as text (.csv) or as numbers (.bin), with the same calls for both, one per column. Only for the
+// sources of this folder.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ inline void append_seconds(std::string& text, std::int64_t ns, std::size_t least
   if (!decimals.empty()) text += "." + decimals;
 }
 
-// `overrun` is left out because it is of the wall clock, `truth` because the columns say it.
+// Without `overrun`, which depends on the wall clock, and without `truth`, which the columns show.
 inline constexpr std::array written_flags{RecordFlag::sample_held,
                                           RecordFlag::sample_late,
                                           RecordFlag::feedback_missing,
@@ -60,7 +60,7 @@ inline constexpr std::array written_flags{RecordFlag::sample_held,
                                           RecordFlag::unresolved,
                                           RecordFlag::hands_off};
 
-// A row's values, one after the other, as text that ends at commas.
+// Writes a row's values as text, separated by commas.
 class TextRow {
  public:
   explicit TextRow(std::string& text) : text_(text) {}
@@ -92,7 +92,6 @@ class TextRow {
   bool first_ = true;
 };
 
-// The same as numbers.
 class NumberRow {
  public:
   NumberRow(double* first, std::size_t apart) noexcept : at_(first), apart_(apart) {}
@@ -102,7 +101,7 @@ class NumberRow {
     *at_ = value;
     at_ += apart_;
   }
-  // Both are exact, so the quotient is the double that is nearest to the decimals.
+  // Both are exact, so the quotient is the double nearest to the decimals.
   void seconds(std::int64_t ns) noexcept { number(static_cast<double>(ns) / 1e9); }
   void word(const char* /*name*/, int value) noexcept { integer(value); }
   void empty() noexcept { number(std::bit_cast<double>(empty_bits)); }
@@ -121,7 +120,6 @@ void put_all(auto& row, const auto& values) {
   for (const double value : values) row.number(value);
 }
 
-// Adds columns one after the other.
 class Columns {
  public:
   void add(std::string name, std::string unit, std::string frame, std::string meaning,

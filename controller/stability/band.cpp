@@ -12,7 +12,7 @@ namespace {
 constexpr double ripple_left = 0.02;    // `left` of the header
 constexpr double highest_share = 0.45;  // of the cycle's rate; the bilinear transform ends at 0.5
 
-// f_c; 0: nothing is left out.
+// f_c; 0: no low-pass.
 double top_Hz(double report_rate_Hz, double period_s) noexcept {
   if (!(report_rate_Hz > 0.0)) return 0.0;
   const double cycles = 1.0 / (report_rate_Hz * period_s);  // N
@@ -23,9 +23,9 @@ double top_Hz(double report_rate_Hz, double period_s) noexcept {
 
 }  // namespace
 
-// Bilinear transform, prewarped so that the corner frequency is kept: Ω = tan(π f T), and of quality Q
+// Bilinear transform, prewarped to keep the corner frequency: Ω = tan(π f T), and with quality Q
 //   a₁ = 2(Ω² − 1)/(1 + Ω/Q + Ω²),   a₂ = (1 − Ω/Q + Ω²)/(1 + Ω/Q + Ω²),
-// with the gain 1/(1 + Ω/Q + Ω²) of a high-pass, and Ω² times as much of a low-pass.
+// with the gain 1/(1 + Ω/Q + Ω²) of a high-pass, and Ω² times that of a low-pass.
 void Band::Section::design(double omega, double inverse_quality, double b1_of_kind) noexcept {
   const double damping = inverse_quality * omega;  // Ω/Q
   const double scale = 1.0 / (1.0 + damping + omega * omega);

@@ -1,14 +1,13 @@
-// The band in which an oscillation is looked for, as a filter of forces and motions alike, so that the phase between
-// them stays.
+// The band-pass for detecting oscillations. Forces and motions pass through the same filter, which keeps their phase.
 //
-// Below it hands move by will: a Butterworth high-pass of order 4. Above it there is something only where a joint
-// reports its position less often than the cycle runs, at f_r: a position that stands and jumps. At a constant speed v
-// and N = 1/(f_r T) cycles a report, its speed per cycle has the mean square N v², which is v² and a ripple of
-// (N − 1) v² at f_r and beyond. A Butterworth low-pass of order 2 leaves (f_c/f_r)⁴ of that; with
+// A Butterworth high-pass of order 4 removes deliberate hand motion. Above the band there is signal only if a joint
+// reports its position less often than the cycle runs, at f_r: the position then stands and jumps. At a constant speed
+// v and N = 1/(f_r T) cycles per report, the speed per cycle has the mean square N v²: v² plus a ripple of (N − 1) v²
+// at f_r and beyond. A Butterworth low-pass of order 2 leaves (f_c/f_r)⁴ of the ripple; with
 //   f_c = f_r (left/(N − 1))^¼
-// `left` = 0.02 of v², a tenth of the least share that counts as an oscillation. The corner is 53 Hz of 200 reports a
-// second at 1 ms. Where all joints report in each cycle, or f_c comes near half of the cycle's rate, nothing is left
-// out.
+// this is `left` = 0.02 of v², a tenth of the smallest share that counts as an oscillation. At 200 reports a second and
+// 1 ms the corner is 53 Hz. There is no low-pass if all joints report in each cycle, or if f_c is near half of the
+// cycle's rate.
 #pragma once
 
 #include <array>
@@ -20,14 +19,14 @@ namespace proxarm::controller {
 
 struct BandLimits {
   double low_Hz = 3.0;
-  double report_rate_Hz = 0.0;  // f_r, of the joint that reports most seldom; 0: each reports in each cycle
+  double report_rate_Hz = 0.0;  // f_r of the joint that reports least often; 0: all joints report in each cycle
 };
 
 class Band {
  public:
   void design(const BandLimits& limits, double period_s) noexcept;
   void reset() noexcept;
-  // What lies below the upper limit: once for each cycle. Then of this what lies above the lower one.
+  // smooth(): the low-pass, called once per cycle. above(): the high-pass, applied to the result of smooth().
   models::Vec3 smooth(const models::Vec3& in) noexcept { return smooths_ ? top_.step(in) : in; }
   models::Vec3 above(const models::Vec3& smoothed) noexcept { return bottom_[1].step(bottom_[0].step(smoothed)); }
   models::Vec3 step(const models::Vec3& in) noexcept { return above(smooth(in)); }

@@ -23,8 +23,8 @@ using Eigen::VectorXd;
 using models::product;
 using models::transposed_product;
 
-// exp(A) by scaling and squaring: Taylor's series of A/2ˢ, whose norm is below 1/2 so that 18 terms leave 1e-22,
-// squared s times.
+// exp(A) by scaling and squaring: Taylor's series of A/2ˢ, squared s times. Its norm is below 1/2, so 18 terms leave
+// 1e-22.
 MatrixXd exponential(MatrixXd A) {
   const double norm = A.cwiseAbs().rowwise().sum().maxCoeff();
   const int squarings = std::max(0, static_cast<int>(std::ceil(std::log2(norm))) + 1);
@@ -57,8 +57,8 @@ ProxyPolynomial proxy_polynomial(int order) {
   return A;
 }
 
-// An age in periods, between two of which what is read lies on a straight line. A quotient of decimal numbers, hence
-// the 1e-9.
+// An age in periods. Values between two periods are interpolated linearly. 1e-9 absorbs the rounding of a quotient of
+// decimal numbers.
 struct Age {
   explicit Age(double periods)
       : whole(static_cast<Index>(std::floor(periods + 1e-9))),
@@ -67,13 +67,13 @@ struct Age {
   double rest;
 };
 
-// The damping ratio of the arm's first mode, and the frequency that a rigid gear is given: far above all others here.
+// Damping ratio of the arm's first mode, and the frequency of a rigid gear, far above all others here.
 constexpr double ringing = 0.03, rigid_Hz = 300.0;
 
 }  // namespace
 
 namespace {
-// Of a drive's loops, by their speeds: ω_v/(2π f), ω_p/ω_v, ω_i/ω_v.
+// Usual ratios of a drive's loops: ω_v/(2π f), ω_p/ω_v, ω_i/ω_v.
 constexpr double velocity_share = 2.0, place_share = 0.25, integral_share = 0.1;
 
 void add_drives(const description::Cell& cell, ElasticArm& arm) {
@@ -96,7 +96,7 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
   constexpr double pi = std::numbers::pi;
   models::ToolKinematics kinematics;
   arm.kinematics(pose_rad, kinematics);
-  // Outside of that space a proxy would be a free mass that no hand moves: neither stable nor real.
+  // Outside the tool's space a proxy would be a free mass that no hand moves: neither stable nor real.
   const models::ToolSpace space = models::tool_space(arm);
   const auto U = space.axes.leftCols(space.dimensions);
   ElasticArm out{.mass = arm.link_mass_matrix(pose_rad),
@@ -155,7 +155,6 @@ bool are_near(const models::ToolPose& a, const models::ToolPose& b) noexcept {
 
 namespace {
 
-// An arm that is led from its start pose.
 class LedArm {
  public:
   explicit LedArm(const models::Arm& arm)  // throws for an arm that can't move the tool
@@ -166,9 +165,9 @@ class LedArm {
     return {start_.translation() + lead.offset_m,
             (models::rotation_by(lead.turn_rad) * models::Quaternion(start_.linear())).normalized()};
   }
-  // On a straight way, as far as the arm gets; false: it doesn't get away from where it is.
+  // Moves straight, as far as the arm reaches; false if it can't move at all.
   bool lead_to(const Lead& lead) {
-    // Away from singularities, such steps turn no joint by the inverse kinematics' 0.01 rad.
+    // Away from singularities, these steps turn each joint by less than the inverse kinematics' 0.01 rad.
     constexpr double step_m = 0.005, step_rad = 0.005, most_steps = 400.0;
     const Lead from = at_, way{lead.offset_m - from.offset_m, lead.turn_rad - from.turn_rad};
     const double wanted = std::max(way.offset_m.norm() / step_m, way.turn_rad.norm() / step_rad);
@@ -220,8 +219,9 @@ std::vector<models::JointVector> led_poses(const models::Arm& arm, const std::ve
   return poses;
 }
 
-// The indices of the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, proxies, the
-// filter's x_f and ẋ_f, the forces that were read, and the drives' [δ, δ̇, ∫δ] and [θ̇, f].
+// Indices into the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, proxies, the filter's
+// x_f and ẋ_f, the kept forces, the drives' [δ, δ̇, ∫δ] and [θ̇, f]; with torque-damped gears the kept torques,
+// modelled accelerations and filter states.
 struct ElasticLoop::State {
   Index n, d, ages, kept, drives, forward, damped, torques, models;
   [[nodiscard]] Index plant() const { return 0; }
@@ -238,7 +238,7 @@ struct ElasticLoop::State {
 };
 
 namespace {
-// The same in each of d directions.
+// The same hand and handle in each of d directions.
 Grip grip_of(const HandModel& hand, double handle_kg, Index d) {
   const MatrixXd one = MatrixXd::Identity(d, d);
   return {hand.stiffness_N_per_m * one, hand.damping_Ns_per_m * one, hand.mass_kg * one, handle_kg * one};
@@ -274,8 +274,8 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopMode
     of_damped_ = MatrixXd::Identity(joints_, joints_)(damped, Eigen::all);
     yields_ = loop.gear_damping.damping_per_s * arm.stiffness.cwiseInverse().asDiagonal() * of_damped_.transpose();
   }
-  // A quotient of decimal numbers, hence the 1e-9. Besides the newest force: one older for the interpolation, and two
-  // for Störmer's correction at order 2.
+  // 1e-9 absorbs the rounding of a quotient of decimal numbers. Besides the newest force, one older is kept for the
+  // interpolation, and two for Störmer's correction at order 2.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + (order_ == 2 ? 3 : 2);
   twist_ = product(arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass, arm_.joints_per_m);
   make_plant(grip, loop.gear_stiffness_ratio);
@@ -341,7 +341,7 @@ void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   plant_ = exponential(A * period_s_);
 }
 
-// q(k) = Σ X_i q(k−i) + X₀ h: what the world forbids is taken out by forces along N.
+// q(k) = Σ X_i q(k−i) + X₀ h; forces along N cancel motion in forbidden directions.
 ElasticLoop::Step ElasticLoop::step_of(const ProxyMatrices& proxy, const MatrixXd& N) const {
   const double T = period_s_;
   const ProxyPolynomial A = proxy_polynomial(order_);
@@ -434,8 +434,8 @@ Index ElasticLoop::kept_torques() const noexcept { return damps() ? Age(torque_a
 
 Index ElasticLoop::kept_models() const noexcept { return damps() ? Age(torque_lag_periods_).whole + 1 : 0; }
 
-// As in GearDamping::step(): takes the damping off the setpoint that is sent. M G ẍ_f is what the filter's acceleration
-// asks of the gears.
+// As in GearDamping::step(): subtracts the damping from the setpoint that is sent. M G ẍ_f is the torque that the
+// filter's acceleration requires of the gears.
 void ElasticLoop::damp(const VectorXd& state, const VectorXd& torque_now, const VectorXd& carried,
                        const Place& acceleration, VectorXd& next) const {
   const Index n = of_damped_.rows(), d = dimensions_, torques = kept_torques(), models = kept_models();

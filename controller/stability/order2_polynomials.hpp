@@ -1,6 +1,5 @@
-// Order 2 as polynomials in w, one period of delay. What the proxy itself computes stands in
-// controller/proxies/force_weights.cpp; these are written from its equations, so that a test of the one by the other
-// means something.
+// Order 2's weights as polynomials in w, one period of delay. They are written from the equations, independently of the
+// proxy's own in controller/proxies/force_weights.cpp, so that a test of one against the other is meaningful.
 #pragma once
 
 #include <array>

@@ -1,11 +1,10 @@
-// Whether what is felt is stable where a session comes by. A session is refused by the pose in which it starts; the
-// arm's modes, and with them the smallest stable mass and inertia, change with the pose: the mass by a third over 0.3 m
-// in the default cell, the inertia of a tool that is led and turned at once (pose_loop.hpp) by far more.
+// Judges during a session whether the felt mass and inertia are stable in the poses that the arm passes, since modes
+// change with the pose: over 0.3 m the default cell's smallest stable mass changes by a third, and the inertia of a
+// tool that is led and turned at once (pose_loop.hpp) by far more. Before a session only the start pose is checked.
 //
-// A place is judged where the tool is 50 mm or more from all that were judged before with the same proxy, the spacing
-// of led_poses(), or turned from them by 0.1 rad or more. Some milliseconds then, of a tool that turns some forty,
-// half a second where it isn't stable; else a comparison; never in the cycle. While mass, inertia or damping change
-// from one cycle to the next, nothing is judged.
+// A place is judged if the tool is at least 50 mm or 0.1 rad (are_near()) from all places judged before with the same
+// proxy. judge() never runs in the cycle: it takes some milliseconds, with a tool that turns some forty, and half a
+// second if the place is unstable. Nothing is judged while mass, inertia or damping change from one cycle to the next.
 #pragma once
 
 #include <cstddef>
@@ -24,14 +23,13 @@ namespace proxarm::controller {
 
 class PassedPoses {
  public:
-  // The proxy as it is felt, what hangs behind the sensor included. Inertia 0: the tool isn't turned.
+  // The proxy as felt, including what hangs behind the sensor. Inertia 0: the tool doesn't turn.
   struct Felt {
     double mass_kg = 0.0, damping_Ns_per_m = 0.0;
     double inertia_kg_m2 = 0.0, turning_damping_Nms_per_rad = 0.0;
     bool operator==(const Felt&) const = default;
   };
 
-  // A place to be judged.
   struct Asked {
     double time_s = 0.0;
     Felt felt;
@@ -39,40 +37,40 @@ class PassedPoses {
     models::JointVector joints_rad;  // of the links
   };
 
-  // How far from swinging it was there.
+  // How far a judged place was from instability.
   struct Place {
     double time_s = 0.0, felt_mass_kg = 0.0;
-    std::optional<double> smallest_stable_mass_kg;  // felt; absent: none is
+    std::optional<double> smallest_stable_mass_kg;  // felt; absent: no mass is stable
   };
 
-  // `loop`: without arms. `turned`, as pose_loop_at() takes it: of a tool that is led and turned at once; its loop is
-  // `loop`. The arm and the cell must outlive it.
+  // `loop`: without arms. `turned`: for a tool that is led and turned at once, as in pose_loop_at(); `loop` replaces
+  // its loop. Precondition: arm and cell outlive this object.
   PassedPoses(const models::Arm& arm, const description::Cell& cell, const HandModel& hand, const LoopModel& loop,
               std::optional<PoseLoopModel> turned = {});
 
-  // From now on the loop is this; what has been judged is judged again when the tool comes by.
+  // Changes the loop. Places judged before are judged again when the tool passes them.
   void change(const LoopModel& loop);
-  // The tool is there at that time, and felt so; `joints_rad`, called only where the place is to be judged, gives the
-  // links' angles.
+  // Reports the tool's pose at time_s; returns a place to judge, if it is new. `joints_rad` is called only then and
+  // gives the links' angles.
   template <class Joints>
   std::optional<Asked> come_to(double time_s, const models::ToolPose& tool_W, const Felt& felt,
                                const Joints& joints_rad) {
     if (!is_new(tool_W, felt)) return {};
     return Asked{time_s, felt, loop_, joints_rad()};
   }
-  // What should be told: it isn't stable there, which wasn't told yet of this mass and inertia, or it asks for half as
-  // much again as was told. Another thread may call this, one at a time, while the tool goes on; what follows is then
-  // that thread's as well.
+  // Judges a place. Returns the unstable places to report: if none was reported yet for this mass and inertia, or this
+  // one requires half as much again. May run on another thread, one call at a time, while come_to() goes on; the
+  // functions below then belong to that thread.
   std::optional<UnstablePlaces> judge(const Asked& asked);
 
-  // From now on the smallest stable mass is looked for in stable places, too: ten times the work of judging one. The
-  // mass alone: turning isn't in it.
+  // From now on also finds the smallest stable mass in stable places, which takes ten times as long as judging. The
+  // mass alone; turning isn't included.
   void find_smallest() noexcept { finds_smallest_ = true; }
-  // Those places, in the order in which they were judged.
+  // These places, in the order in which they were judged.
   [[nodiscard]] const std::vector<Place>& places() const noexcept { return found_; }
 
   [[nodiscard]] std::size_t judged() const noexcept { return judged_; }
-  // Of all that was felt.
+  // Over the whole session.
   [[nodiscard]] const std::optional<UnstablePlaces>& unstable() const noexcept { return unstable_; }
 
  private:
@@ -88,10 +86,10 @@ class PassedPoses {
   LoopModel loop_;
   std::optional<PoseLoopModel> turned_;
   Felt felt_;
-  std::vector<models::ToolPose> places_;  // judged with this loop and proxy; the last is the one that the tool is near
-  // Of judge().
+  std::vector<models::ToolPose> places_;  // judged with this loop and proxy; the last is the one near the tool
+  // State of judge().
   std::size_t judged_ = 0;
-  std::optional<UnstablePlaces> unstable_, told_;  // told_: of what was felt last
+  std::optional<UnstablePlaces> unstable_, told_;  // told_: for the last mass and inertia
   Felt told_felt_;
   bool finds_smallest_ = false;
   std::vector<Place> found_;

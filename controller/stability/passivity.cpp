@@ -128,7 +128,7 @@ void PassivityObserver::follow_spell() noexcept {
   if (spell_.lasts() || (oscillates_ && remembered_s_ > 0.0)) remembered_s_ = config_.remembered_s;
 }
 
-// `begins`: another oscillation begins.
+// `begins`: another oscillation begins in this period.
 void PassivityObserver::follow_damping(bool begins) noexcept {
   const double felt = felt_damping_Ns_per_m();
   const bool acts = damping_ == Damping::at_once || remembered_s_ > 0.0;

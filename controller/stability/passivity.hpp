@@ -1,65 +1,59 @@
-// Observes the flow of energy while a hand leads the tool, and adds damping when the loop gives energy to the hand.
+// Observes the energy flow while a hand leads the tool, and adds damping when the loop gives energy to the hand.
 //
-// Energy is observed at two ports. At the hand's port, the measured force h acts along the motion x of the tool, by the
+// Energy is observed at two ports. At the hand's port, the measured force h acts along the tool's motion x, by the
 // encoders. At the proxy's port the same force acts along the proxy's motion, which precedes the tool's by the loop's
 // delay. With Δ a difference over one period:
-//   W_h(k) = W_h(k−1) + ½(h(k) + h(k−1))·Δx(k)                    what the hand gave to the device
-//   W_p(k) = W_p(k−1) + T h(k)·v(k),   W_w(k) = W_w(k−1) + T f(k)·v(k)    what the proxy got from hand and world
-// T v(k) times the equation of motion is the proxy's own balance, exact up to rounding. At order 1, where
-// v = ∇q(k)/T, with (a − b)·a = ½(a² − b² + (a − b)²):
+//   W_h(k) = W_h(k−1) + ½(h(k) + h(k−1))·Δx(k)                    from the hand to the device
+//   W_p(k) = W_p(k−1) + T h(k)·v(k),   W_w(k) = W_w(k−1) + T f(k)·v(k)    to the proxy, from hand and world
+// The equation of motion times T v(k) is the proxy's energy balance, exact up to rounding. At order 1, where v =
+// ∇q(k)/T, with (a − b)·a = ½(a² − b² + (a − b)²):
 //   T (h + f)·v = Δ(½M v²) + T B v² + Δ(½K_v (q − q_ref)²) + ½M(∇v)² + ½K_v(∇q)²
-// The last two terms are the step's own loss, so the integration never generates energy. At order 2 the same holds with
-// the h, B and K_v that it weights over its steps. If the world generates energy (moving
-// objects; curved surfaces, on which (26) isn't neutral), W_w > 0. W_p − W_h is the energy that delay, drives and arm
-// add between the two ports. For a force that accelerates M at the frequency ω, and a motion that lags by L, the hand
-// feels the damping
+// The last two terms are the step's own loss, so the integration never generates energy; at order 2 the same holds with
+// its weighted h, B and K_v. W_w > 0 if the world generates energy: moving objects, or curved surfaces, on which (26)
+// isn't neutral. W_p − W_h is the energy that delay, drives and arm add. For a force that accelerates M at the
+// frequency ω, and a motion that lags by L, the hand feels the damping
 //   b(ω) = B cos ωL − M ω sin ωL,
 // which is negative at every frequency where B < M ω tan ωL. The hand's own damping must outweigh it, or the loop
 // oscillates.
 //
-// A force reading of age τ belongs to the motion τ ago. At 3 Hz and 50 ms the two are 54° apart, enough to mistake a
-// hand that is shaken for one that shakes. So the motion is delayed by τ, too (delay.hpp). Below, x is the delayed
-// motion.
+// A force reading of age τ belongs to the motion τ ago. At 3 Hz and 50 ms the two are 54° apart, which would confuse
+// who shakes whom. So the motion is delayed by τ, too (delay.hpp); below, x is the delayed motion.
 //
-// Oscillation is judged at the hand's port, above the band in which hands move deliberately (low_Hz). One filter takes
-// this band of force and motion alike, which keeps the phase between them (band.hpp). Averages are over average_s, and
-// ẋ is what the filter has below its upper limit:
-//   P̂ = ⟨h̃·ẋ̃⟩,   b̂ = P̂/⟨ẋ̃²⟩        power that the hand gives, and the damping that it finds, there
-//   E(k) = min(E(k−1) + T(P̂ + refill_W), tank_J)       the balance; E(0) = tank_J, never below −tank_J
-// The device oscillates while the balance E is negative, P̂ < −refill_W, and the band holds more than a share of ⟨ẋ²⟩.
-// The tank is the energy that a touch may cost: when a wall stops the proxy, energy moves from the hand's own band into
-// this one for a moment. While the device oscillates, the added damping grows,
+// Oscillation is judged at the hand's port, above the band of deliberate hand motion (low_Hz), with one filter for
+// force and motion (band.hpp). Averages are over average_s, and ẋ is the speed after the filter's low-pass:
+//   P̂ = ⟨h̃·ẋ̃⟩,   b̂ = P̂/⟨ẋ̃²⟩        power that the hand gives, and damping that it feels, in the band
+//   E(k) = min(E(k−1) + T(P̂ + refill_W), tank_J)       the balance; E(0) = tank_J, E ≥ −tank_J
+// The device oscillates while E is negative, P̂ < −refill_W, and the band holds more than a share of ⟨ẋ²⟩. The tank is
+// the energy that a touch may cost: when a wall stops the proxy, energy moves from the hand's own band into this one
+// for a moment. While the device oscillates, the added damping grows,
 //   Ḃ_a = −b̂/rise_s, up to max_damping,
-// until the hand's port is passive (b̂ ≥ 0); then the loop is stable with any passive hand. Otherwise B_a decays. Its
-// time constant is release_s after the first oscillation, which may have been only a blow. It doubles with each further
-// oscillation that begins before B_a has gone, up to longest_release_s, since with a grip for which the loop isn't
-// stable the oscillation returns as soon as B_a allows it. B_a is part of (26)'s B, which is implicit, so it changes
+// until the hand's port is passive (b̂ ≥ 0); then the loop is stable with any passive hand. Otherwise B_a decays with a
+// time constant of release_s. This doubles, up to longest_release_s, with each oscillation that begins before B_a has
+// gone: the loop is then unstable with this grip, and not merely hit. B_a is part of (26)'s implicit B, so it changes
 // neither position nor velocity by itself.
 //
-// A tool that turns does all this with place and rotation together. τ_h is the hand's torque about the rendered point,
-// ω the tool's angular velocity, and a rotation counts by the way of what is ρ off: ρ² = J/M, the radius of gyration of
-// what is felt, in m²/rad², so that M(ẋ² + ρ²ω²) is twice its energy.
+// For a tool that turns, position and rotation are judged together. τ_h is the hand's torque about the rendered point,
+// ω the tool's angular velocity. Rotations are weighted with ρ² = J/M in m²/rad², the squared radius of gyration of
+// what is felt, so that M(ẋ² + ρ²ω²) is twice its energy.
 //   W_h += ½(τ_h(k) + τ_h(k−1))·Δφ(k),   W_p += T τ_h·ω,   W_w += T τ_w·ω
-//   P̂ = ⟨h̃·ẋ̃ + τ̃·ω̃⟩,   and ⟨ẋ̃² + ρ²ω̃²⟩, ⟨x̃² + ρ²φ̃²⟩, ⟨h̃² + τ̃²/g²⟩ where it says ⟨ẋ̃²⟩, ⟨x̃²⟩, ⟨h̃²⟩
-// Place and rotation give and take in turns: neither alone says who gives. A torque is what two forces on the ends of a
-// grip make, whose breadth is g. The added damping acts on the place as B_a and on the rotation as ρ²B_a, so both fall
-// at the rate B_a/M. Its motion is looked at twice: by the links as the arm's model has them (link_motion.hpp), and by
-// the motors. It oscillates if either says so, and b̂ is the smaller one. Near the arm's first mode the motors' phase is
-// wrong, and so is the links' where the gears' stiffness isn't what it is said to be. Energies, ⟨x̃²⟩ and frequency are
-// the links'.
+//   P̂ = ⟨h̃·ẋ̃ + τ̃·ω̃⟩,   and ⟨ẋ̃² + ρ²ω̃²⟩, ⟨x̃² + ρ²φ̃²⟩, ⟨h̃² + τ̃²/g²⟩ in place of ⟨ẋ̃²⟩, ⟨x̃²⟩, ⟨h̃²⟩
+// Position and rotation exchange energy, so neither alone shows who gives. A torque counts as two forces on the ends of
+// a grip of breadth g. The added damping acts on the position as B_a and on the rotation as ρ²B_a, so both decay at the
+// rate B_a/M. The motion is observed by the links of the arm's model (link_motion.hpp) and by the motors. The tool
+// oscillates if either view says so, and b̂ is the smaller one: near the arm's first mode the motors' phase is wrong,
+// and the links' phase if the gears' true stiffness differs from the model's. Energies, ⟨x̃²⟩ and frequency are the
+// links'.
 //
-// The encoders of a tool that doesn't turn don't see the gears' twist. If the hand's mass oscillates on the gears, its
-// force shakes the proxy, and this drives the gears' own mode. The links then move far more than the motors, and P̂
-// doesn't show it. So the device also counts as oscillating if the force itself shakes as no hand can: ⟨h̃²⟩ > shake_N²
-// at a frequency (⟨ẋ̃²⟩/⟨x̃²⟩)^½ above shake_Hz, the fastest at which people shake something. Damping then grows as for
-// the largest −b̂.
+// For a tool that doesn't turn, the motion comes from the encoders, which don't see the gears' twist. If the hand's
+// mass oscillates on the gears, the links move far more than the motors, and P̂ doesn't show it. So the device also
+// counts as oscillating if the force shakes as no hand can: ⟨h̃²⟩ > shake_N² at a frequency (⟨ẋ̃²⟩/⟨x̃²⟩)^½ above
+// shake_Hz, the fastest at which people shake something. Damping then grows as for the largest −b̂.
 //
 // A blow on a wall, a hand that shakes for a moment, and ringing gears look the same at first, but end by themselves.
-// Whether an oscillation lasts is judged by its amplitude A over time, A² = 2⟨x̃²⟩, x̃ being the motion in the same band
-// (spell.hpp). If it lasts, the loop isn't stable with this grip. Damping::what_lasts begins then, and acts at once for
-// remembered_s after each oscillation.
+// Whether an oscillation lasts is judged by its amplitude over time (spell.hpp). If it lasts, the loop is unstable with
+// this grip. Damping::what_lasts acts from then on, and at once if the device oscillates again within remembered_s.
 //
-// Vectors in W. Neither allocates, locks nor throws. A session without passivity doesn't have this object.
+// Vectors in W. Never allocates, locks or throws. A session without passivity doesn't have this object.
 #pragma once
 
 #include <array>
@@ -77,22 +71,22 @@
 namespace proxarm::controller {
 
 struct PassivityConfig {
-  // Deliberate, forceful motion of hands ends at about 2 Hz, the band of the apparent mass. A stiff grip (3000 N/m) on
-  // 1 to 10 kg becomes unstable at 8 to 2.6 Hz.
+  // Deliberate, forceful hand motion ends at about 2 Hz, the band of the apparent mass. A stiff grip (3000 N/m) on 1 to
+  // 10 kg becomes unstable at 8 to 2.6 Hz.
   BandLimits band{.low_Hz = 3.0};
   double average_s = 0.1;
   double share = 0.2;        // of the energy of all motion; a deliberate motion at 2 Hz has 0.04
   double tank_J = 1e-3;      // for a grip of 3000 N/m: an amplitude of 0.8 mm
   double refill_W = 0.5e-3;  // the power of a damping of −40 Ns/m at 0.2 mm and 4 Hz: hardly felt, and tolerated
   double rise_s = 0.05;
-  double most_felt_Ns_per_m = 200.0;  // bound of −b̂: B_a grows by at most 4 Ns/m in a millisecond, which nobody feels
+  double most_felt_Ns_per_m = 200.0;  // bound of −b̂: B_a grows by at most 4 Ns/m in a millisecond, which isn't felt
   double release_s = 0.5;
   double longest_release_s = 16.0;
   double gone_Ns_per_m = 0.1;  // below this, B_a counts as gone; far less than any grip needs
-  // A grip of K N/m is stabilised by about K L, L being the loop's delay: 670 Ns/m for 10,000 N/m and 67 ms.
+  // A grip of K N/m needs a damping of about K L, L being the loop's delay: 670 Ns/m for 10,000 N/m and 67 ms.
   double max_damping_Ns_per_m = 1000.0;
   double shake_N = 20.0, shake_Hz = 7.0;
-  // g: palm and fingertips are so far apart, and so are the ends of a handle. 20 N there make 2 Nm. Shaking a hand of
+  // g: the distance between palm and fingertips, or between a handle's ends. 20 N there make 2 Nm. Shaking a hand of
   // 0.003 kg m² by 0.15 rad at 7 Hz takes 0.9 Nm.
   double grip_m = 0.1;
   SpellConfig spell{};
@@ -101,12 +95,12 @@ struct PassivityConfig {
 };
 
 enum class Damping : std::uint8_t {
-  never,  // energies and oscillations are observed, B_a stays 0
+  never,  // B_a stays 0; energies and oscillations are still observed
   what_lasts,
   at_once,
 };
 
-// What a proxy that turns did in a step: twists are (m/s, rad/s), wrenches (N, Nm) about the rendered point.
+// A step of a proxy that turns: twists in (m/s, rad/s), wrenches in (N, Nm) about the rendered point.
 struct TurningPort {
   models::Twist velocity_W = models::Twist::Zero(), world_W = models::Twist::Zero();
   double kinetic_J = 0.0;
@@ -120,10 +114,10 @@ class PassivityObserver {
   // Precondition: called before start(), since the filters' state belongs to the old period.
   void set_period(double period_s) noexcept;
   void start(const models::Vec3& tool_W) noexcept;
-  // Precondition: called before each step, with this period's force and the tool's position. Returns the step's B_a,
-  // Ns/m.
+  // Returns the step's B_a, Ns/m. Precondition: called before each step, with this period's force and the tool's
+  // position.
   double observe_hand(const models::Vec3& h_W, const models::Vec3& tool_W) noexcept;
-  // The same of a tool that turns, with ρ² in m²/rad². Precondition: a session calls one of the two throughout.
+  // The same for a tool that turns, with ρ² in m²/rad². Precondition: a session calls only one of the two.
   double observe_hand(const models::Wrench& h_W, const ToolMove& move, double gyration_m2) noexcept;
   // Precondition: called after each step, with the proxy's velocity, the world's force on it, its mass and total
   // damping.
@@ -138,7 +132,7 @@ class PassivityObserver {
   [[nodiscard]] double oscillation_m_per_s() const noexcept;
   [[nodiscard]] double felt_damping_Ns_per_m() const noexcept;
   [[nodiscard]] const PortEnergies& energies_J() const noexcept { return energies_; }
-  // Of a tool that turns: the sums of its ways, m, and of its angles, rad, since rendering began.
+  // For a tool that turns: sums of its displacements, m, and rotations, rad, since rendering began.
   [[nodiscard]] const models::Twist& moved_W() const noexcept { return seen_.moved_W; }
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -154,9 +148,9 @@ class PassivityObserver {
   }
 
  private:
-  struct View {  // the motion by one account
+  struct View {  // the motion as the links or the motors show it
     Band motion, place;
-    Band turning, angle;  // of a tool that turns, as the next
+    Band turning, angle;  // of a tool that turns, as is moved_W
     models::Twist moved_W = models::Twist::Zero();
     double power = 0.0, band = 0.0, all = 0.0;  // ⟨h̃·ẋ̃⟩, ⟨ẋ̃²⟩, ⟨ẋ²⟩
     double square = 0.0;                        // ⟨x̃²⟩
@@ -181,7 +175,7 @@ class PassivityObserver {
   double release_s_ = 0.0;     // present time constant of B_a's decay
   Delay<models::Vec3> delay_;  // delays the motion by the force's age
   Band force_, torque_;
-  View seen_, motors_;                           // by what counts; and of a tool that turns also by the motors
+  View seen_, motors_;                           // the view that counts; for a tool that turns also the motors'
   models::Vec3 start_W_ = models::Vec3::Zero();  // where the tool was when rendering began
   models::Vec3 h_ = models::Vec3::Zero(), h_k1_ = models::Vec3::Zero(), tool_k1_ = models::Vec3::Zero();
   models::Vec3 torque_W_ = models::Vec3::Zero();  // τ_h

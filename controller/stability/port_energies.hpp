@@ -3,14 +3,14 @@
 
 namespace proxarm::controller {
 
-// Energies in J, since rendering began; of a tool that turns, with what its rotation has of each.
+// Energies in J since rendering began; for a tool that turns, rotation included.
 struct PortEnergies {
   double hand = 0.0;     // W_h
   double proxy = 0.0;    // W_p
   double world = 0.0;    // W_w
   double kinetic = 0.0;  // ½Mv² (+ ½Jω²) of the proxy, now
   double damping = 0.0;  // Σ T B v²: dissipated by the virtual damping, B_a included
-  double added = 0.0;    // the share of B_a in that
+  double added = 0.0;    // B_a's share of `damping`
 };
 
 }  // namespace proxarm::controller

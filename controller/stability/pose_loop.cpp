@@ -32,14 +32,14 @@ Grip grip_of(const PoseLoopModel& model) {
           model.behind_sensor_W};
 }
 
-// The place r, held in these directions.
+// N of the point r, held in these directions.
 MatrixXd held(const Vec3& r, const models::Mat3& directions, Eigen::Index count) {
   MatrixXd N(6, count);
   for (Eigen::Index i = 0; i < count; ++i) N.col(i) << directions.col(i), r.cross(directions.col(i));
   return N;
 }
 
-// Orthonormal, n first.
+// An orthonormal basis that begins with n.
 models::Mat3 beside(const Vec3& n) {
   models::Mat3 directions;
   directions.col(0) = n;
@@ -48,7 +48,7 @@ models::Mat3 beside(const Vec3& n) {
   return directions;
 }
 
-// How a drive follows isn't known: as a lag or by feed-forward. Without a lag there is but the one.
+// Loops with both kinds of drive, since the cell doesn't say which it has. Without a time constant both are the same.
 std::vector<ElasticLoop> with_both_drives(const ElasticArm& arm, const PoseLoopModel& model) {
   const Grip grip = grip_of(model);
   LoopModel loop = model.loop;
@@ -116,7 +116,7 @@ ProxyMatrices PoseLoop::proxy(const Touch& touch, double mass_kg, double inertia
 
 bool PoseLoop::stable(const ElasticLoop& loop, const Touch& touch, double mass_kg, double inertia_kg_m2) const {
   const ProxyMatrices lighter = proxy(touch, mass_kg, inertia_kg_m2, elastic_margin);
-  // Else what hangs behind the sensor is felt as more than was asked for.
+  // Otherwise the part behind the sensor exceeds the requested mass or inertia.
   if (Eigen::LLT<MatrixXd>(lighter.mass).info() != Eigen::Success) return false;
   return loop.spectral_radius(lighter, touch.forbidden) < 1.0;
 }
@@ -128,7 +128,7 @@ bool PoseLoop::stable(double mass_kg, double inertia_kg_m2) const {
   });
 }
 
-// Where a contact is stable with what the others ask for, it isn't searched: most aren't.
+// Most contacts are stable at the inertia that others require; these aren't searched.
 std::optional<double> PoseLoop::smallest_inertia(double mass_kg) const {
   constexpr double least_kg_m2 = 1e-6, close_enough = 1.005;
   double smallest = 0.0;
@@ -145,8 +145,8 @@ std::optional<double> PoseLoop::smallest_inertia(double mass_kg) const {
 }
 
 namespace {
-// Whether a mode goes to and fro: half a period later, on the other side, more than a tenth of it is left. One that
-// doesn't has fallen to the tenth, which is told, before it swings back.
+// Whether a mode swings: half a period later, on the other side, more than a tenth of it is left. Other modes fall to
+// the reported tenth before they swing back.
 bool swings(const std::complex<double>& s) { return s.real() * std::numbers::pi > std::log(0.1) * std::abs(s.imag()); }
 }  // namespace
 

@@ -1,4 +1,4 @@
-// The smallest of some quantity that holds.
+// Searches the smallest value of a quantity for which a condition holds.
 #pragma once
 
 #include <cmath>
@@ -6,8 +6,8 @@
 
 namespace proxarm::controller {
 
-// Tried from the largest down until one doesn't hold, not below `least`; the last step is then bisected to a share of
-// `close_enough`. None: the largest doesn't hold. What doesn't hold between others that do isn't seen if its interval
+// Tries values from `largest` down to `least` until one doesn't hold, then bisects the last step to a ratio of
+// `close_enough`. nullopt: `largest` doesn't hold. An interval of failing values between holding ones is missed if it
 // is narrower than a step.
 template <typename Holds>
 std::optional<double> smallest_from_above(Holds holds, double largest, double least, double close_enough) {

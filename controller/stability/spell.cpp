@@ -7,8 +7,9 @@
 namespace proxarm::controller {
 namespace {
 
-// Relative to the largest ⟨x̃²⟩ that is remembered: the least for an oscillation that lasts, and the bound below which
-// it is over. Between the first two, the oscillation may decay, and must go on for decaying_s and some periods.
+// Shares of the largest remembered ⟨x̃²⟩: above the first, the oscillation is steady; below the second, it doesn't
+// last; below the third, it is over. Between the first two it may decay, and must go on for decaying_s and
+// lasting_periods.
 constexpr double steady_share = 0.9, kept_share = 0.5, died_away = 1.0 / 16.0;
 
 }  // namespace

@@ -47,9 +47,9 @@ Polynomial polynomial(const std::array<double, N>& coefficients) {
   return {coefficients.begin(), coefficients.end()};
 }
 
-// w^n for n ≥ 0, which needn't be an integer.
+// w^n for n ≥ 0, also for fractions.
 Polynomial delay(double periods) {
-  // L/T is a quotient of decimal numbers; if rounding puts it just below a whole number, that number is meant.
+  // L/T is a quotient of decimal numbers; rounding may put it just below a whole number.
   const double whole = std::floor(periods + 1e-9), rest = std::max(0.0, periods - whole);
   Polynomial w(static_cast<std::size_t>(whole) + 2, 0.0);
   w[static_cast<std::size_t>(whole)] = 1.0 - rest;
@@ -88,7 +88,7 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   return {lag * (difference * difference), lag * own + force};
 }
 
-// Written out, because std::complex tests each product for NaN, which would take most of a sweep's time.
+// Horner's scheme written out: std::complex tests each product for NaN, which would take most of a sweep's time.
 Complex evaluate(const Polynomial& p, Complex w) {
   double re = 0.0, im = 0.0;
   for (std::size_t i = p.size(); i-- > 0;) {
@@ -129,8 +129,8 @@ double mass_at(const Loop& loop, double theta) {
 // All masses in (0, max] that put a root on the unit circle, in descending order.
 std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
   constexpr double pi = std::numbers::pi;
-  // The grid of θ has 200 points per decade at its lower end, since the slow roots of a large mass are at θ = T√(K/M).
-  // At its upper end it has at least 40 points for each turn of w^n around the circle.
+  // The grid of θ has 200 points per decade at its lower end: the slow roots of a large mass are at θ = T√(K/M). At its
+  // upper end it has at least 40 points for each turn of w^n around the circle.
   std::vector<double> grid;
   for (int i = 0; i <= 1200; ++i) grid.push_back(0.1 * std::pow(10.0, (i - 1200) / 200.0));
   const std::size_t even = 40 * std::max<std::size_t>(loop.Y.size(), 25);
@@ -157,12 +157,12 @@ std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
   return masses;
 }
 
-// Beside the proxy's own: the spring of a touch in a tool's space, and the directions N that friction holds.
+// A contact adds to the proxy: a spring in the tool's space, and the directions N that friction holds.
 struct Touch {
   Eigen::MatrixXd spring, forbidden;
 };
 
-// A basis of what is across n, which has two or three dimensions.
+// A basis orthogonal to n; n has two or three dimensions.
 Eigen::MatrixXd across(const Eigen::VectorXd& n) {
   Eigen::MatrixXd basis(n.size(), n.size() - 1);
   if (n.size() == 2) {
@@ -174,9 +174,9 @@ Eigen::MatrixXd across(const Eigen::VectorXd& n) {
   return basis;
 }
 
-// Free motion first, then the layers, as far as an arm's tool can press on them.
+// Free motion first, then the layers that the arm's tool can press on.
 std::vector<Touch> touches_of(const ElasticArm& arm, const LoopModel& loop) {
-  constexpr double least_share = 0.05;  // of a normal in the tool's space; below, friction holds more than the layer
+  constexpr double least_share = 0.05;  // of a normal in the tool's space; below it, friction holds more than the layer
   const Eigen::Index d = arm.jacobian.rows();
   std::vector<Touch> touches{{Eigen::MatrixXd::Zero(d, d), Eigen::MatrixXd(d, 0)}};
   if (!loop.layers || arm.axes.cols() != d) return touches;
@@ -196,12 +196,11 @@ bool damps_gears(const LoopModel& loop) {
   return loop.gear_damping.damping_per_s > 0.0 && loop.gear_damping.joints != 0 && loop.arms;
 }
 
-// A horizon is chosen, and judged, with drives that lag: they are what it compensates for.
+// A horizon is chosen and judged with drives that lag, since lookahead compensates for lags.
 enum class Drives { lag, both };
 
-// Where gears are damped by their torque, a loop has to hold with each of these, too: the damping is what makes a mass
-// stable, and so it is only as good as what it goes by. A torque that is measured a fifth too small asks for less than
-// gears that are soft; those, which ask for most, come first.
+// With torque-damped gears a loop must hold with each of these errors, too, since its stability rests on that
+// measurement. Soft gears come first: they require the most. Torques a fifth too small are less critical.
 std::vector<LoopModel> with_torque_errors(const LoopModel& loop) {
   if (!damps_gears(loop)) return {loop};
   LoopModel soft = loop, late = loop;
@@ -217,8 +216,7 @@ LoopModel feeding_forward(LoopModel loop) {
   return loop;
 }
 
-// The loops in all poses, free and on all layers, with drives that lag and with drives that feed forward: the cell
-// doesn't say which it has.
+// The loops in all poses, free and on all layers, with both kinds of drive: the cell doesn't say which it has.
 class ElasticLoops {
  public:
   ElasticLoops(const HandModel& hand, const LoopModel& loop, Drives drives = Drives::both)
@@ -240,8 +238,8 @@ class ElasticLoops {
     }
     return largest;
   }
-  // Above which every mass up to max_mass_kg is stable. Most touches are stable with what others ask for; these aren't
-  // searched.
+  // Returns the mass above which every mass up to max_mass_kg is stable. Most touches are stable at the mass that
+  // others require; these aren't searched.
   [[nodiscard]] std::optional<double> smallest_stable(double max_mass_kg) const {
     constexpr double least_kg = 1e-3, close_enough = 1.002;
     double smallest = 0.0;
@@ -270,7 +268,7 @@ class ElasticLoops {
                                 touch.forbidden);
   }
 
-  // At some masses from the smallest to the largest: a layer's unstable masses can lie above ones that are stable.
+  // Checks some masses from the smallest to the largest: a layer's unstable masses can lie above stable ones.
   template <class Holds>
   static bool holds_from(double smallest_kg, double largest_kg, const Holds& holds) {
     for (const double share : {0.0, 0.1, 0.25, 1.0}) {
@@ -283,7 +281,7 @@ class ElasticLoops {
   std::vector<Posed> loops_;
 };
 
-// K_v of the rigid loop, free and along each layer's stiffest direction, each once.
+// K_v of the rigid loop, free and along each layer's stiffest direction, without duplicates.
 std::vector<double> springs_of(const LoopModel& loop) {
   std::vector<double> springs{loop.spring_N_per_m};
   if (!loop.layers) return springs;
@@ -296,14 +294,14 @@ std::vector<double> springs_of(const LoopModel& loop) {
   return springs;
 }
 
-// Above this mass the gears don't matter, since the hand's mass is too small beside the proxy's. Besides, rounding
-// couldn't tell the eigenvalues of the slowest modes from 1; a proxy has two that are close to it.
+// Above this mass the gears don't matter, since the hand's mass is small compared to the proxy's. Besides, rounding
+// couldn't separate the slowest modes' eigenvalues from 1; a proxy has two close to it.
 constexpr double heaviest_on_gears_kg = 50.0;
 
-// What people ask for: between the lightest and what an arm weighs.
+// A usual felt mass, between the lightest and the arm's own.
 constexpr double usual_kg = 10.0;
 
-// Of a rigid arm: from the top down to the first interval of masses that aren't stable.
+// For a rigid arm: searches from the top down to the first interval of unstable masses.
 std::optional<double> smallest_on_rigid(const Loop& loop, double max_mass_kg) {
   if (!(spectral_radius(loop, max_mass_kg) < 1.0)) return std::nullopt;
   double smallest = max_mass_kg;
@@ -317,7 +315,7 @@ std::optional<double> smallest_on_rigid(const Loop& loop, double max_mass_kg) {
   return smallest;
 }
 
-// Of an order 2 whose events count: its free motion, and (26).
+// The two methods of order 2 with events: its free motion, and (26) at events.
 std::pair<LoopModel, LoopModel> both_methods(const LoopModel& loop) {
   LoopModel free = loop, at_events = loop;
   free.with_events = false;
@@ -325,7 +323,6 @@ std::pair<LoopModel, LoopModel> both_methods(const LoopModel& loop) {
   return {free, at_events};
 }
 
-// The loop with these touches alone.
 LoopModel with_layers(const LoopModel& loop, std::vector<LayerTouch> layers) {
   LoopModel with = loop;
   with.layers = layers.empty() ? nullptr : std::make_shared<const std::vector<LayerTouch>>(std::move(layers));
@@ -412,13 +409,12 @@ bool with_margins(const HandModel& hand, const LoopModel& loop,
 
 namespace {
 
-// A hand, and the loop that it closes.
 struct Held {
   HandModel hand;
   LoopModel loop;
 };
 
-// What a horizon has to be stable with: each pose, hand, delay and gear alone.
+// One loop for each combination of pose, hand, delay and gear stiffness with which a horizon must be stable.
 std::vector<Held> held_in_all_ways(const HandModel& hand, const LoopModel& model, double proxy_mass_kg) {
   std::vector<LoopModel> poses;
   if (!model.arms) poses = {model};
@@ -472,7 +468,7 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
 }
 
 namespace {
-// Whether gears as stiff as gear_margins says come to rest under what is felt as usual, in a heavy hand, too.
+// Whether gears as stiff as gear_margins.back() come to rest under 10 and 50 kg, in a heavy hand, too.
 bool stiff_gears_hold(const HandModel& hand, LoopModel loop) {
   loop.gear_stiffness_ratio = gear_margins.back();
   HandModel heavy = hand;
@@ -491,7 +487,7 @@ double best_gear_damping_per_s(const HandModel& hand, const LoopModel& model) {
   loop.order = 1;
   loop.layers = nullptr;
   loop.gear_damping.damping_per_s = 0.0;
-  // A κ that isn't stable with a lighter mass than the best one isn't searched.
+  // Skips a κ that is unstable just below the smallest mass so far.
   constexpr double lighter = 0.98;
   double best = 0.0, least_kg = smallest_stable_mass(hand, loop).value_or(heaviest_on_gears_kg);
   for (const double tried : tried_gear_dampings_per_s) {
@@ -515,10 +511,10 @@ LoopModel with_worst_layers(const HandModel& hand, const LoopModel& loop, double
   return with_layers(loop, {*by_radius[0].second, *by_radius[1].second});
 }
 
-// Just below the smallest mass, the touch that asks for it isn't stable; where no mass is, at the heaviest on gears. A
-// layer's unstable masses can lie above ones that are stable there.
+// Just below the smallest stable mass, the touch that requires it is unstable. If no mass is stable, touches are tried
+// at heaviest_on_gears_kg. A layer's unstable masses can lie above stable ones.
 std::optional<LayerLimit> decisive_layer(const HandModel& hand, const LoopModel& loop) {
-  constexpr double more = 1.01;  // than what a search leaves
+  constexpr double more = 1.01;  // than the search's tolerance
   if (!loop.layers) return std::nullopt;
   const std::optional<double> smallest = smallest_stable_mass(hand, loop);
   const std::optional<double> without = smallest_stable_mass(hand, with_layers(loop, {}));
@@ -546,8 +542,8 @@ std::optional<DampedMass> least_damping(const LoopModel& loop, double most_kg,
 
 namespace {
 
-// The words of a check: of a mass in space, or of an inertia about a point; and the unit of the dampings that are
-// tried: a hand that is damped by 20 Ns/m at 0.1 m turns with 0.2 Nms/rad.
+// Words of a check, for a mass or for an inertia about a point. `damping` scales tried_dampings: a hand damped by 20
+// Ns/m at 0.1 m turns with 0.2 Nms/rad.
 struct Words {
   const char *option, *unit, *what, *damping_option;
   const char *stiffness_unit, *damping_unit;
@@ -556,10 +552,10 @@ struct Words {
 constexpr Words of_mass{"--mass", "kg", "mass", "--damping", "N/m", "Ns/m", 1.0};
 constexpr Words of_inertia{"--inertia", "kg m²", "inertia", "--turning-damping", "Nm/rad", "Nms/rad", 0.01};
 
-// More isn't advised for the sake of a light mass.
+// A larger damping isn't advised for the sake of a light mass.
 constexpr double honey_Ns_per_m = 50.0;
 
-// "--damping 20 Ns/m, with which 12 kg are stable"; empty: no damping that is tried does it.
+// For example "--damping 20 Ns/m, with which 12 kg are stable"; empty if no tried damping suffices.
 std::string damping_text(const HandModel& hand, const LoopModel& loop, double most_felt, double most_damping,
                          const Words& w) {
   const double handle = loop.handle_mass_kg;

@@ -1,5 +1,5 @@
-// Whether (26) is stable while a hand holds the tool: closed-loop eigenvalues in free motion, and the smallest mass
-// that is stable.
+// Judges whether (26) is stable while a hand holds the tool: closed-loop eigenvalues in free motion, and the smallest
+// stable mass.
 //
 // In free motion the loop is linear, with w = z⁻¹ one period of delay:
 //   proxy   A(w) q = S(w) h     order 1: A = M(1−w)²/T² + B(1−w)/T + K_v,  S = 1
@@ -9,28 +9,26 @@
 //   hand    h = −w^(1+L/T) [K_h + D_h(1−w)/T + m_h(1−w)²/T²] p
 // so the eigenvalues z = 1/w are the roots of
 //   C(w) = (1−βw) A(w) + (1−β) S(w) w^(1+L/T) [K_h + D_h(1−w)/T + m_h(1−w)²/T²].
-// L is the loop's delay beyond the one period that any sampled loop has. An L between two periods is interpolated
-// linearly. What moves after the force sensor (the handle, the hand) belongs to m_h, because the sensor measures the
+// L is the loop's delay beyond the one period that any sampled loop has; a fraction of a period is interpolated
+// linearly. m_h includes all that moves behind the force sensor (handle and hand), because the sensor measures the
 // force that moves it.
 //
-// With lookahead (rendering/lookahead.hpp) the drives are sent to where the proxy will be after s = H/T steps if it
-// coasts: q + s(q − q₁) = P q, with P(w) = 1 + s(1−w). P multiplies the term with (1−β). B and K_v change that point
-// only through the acceleration within H; this is neglected.
+// With lookahead (rendering/lookahead.hpp) the drives are sent to where a coasting proxy will be after s = H/T steps: q
+// + s(q − q₁) = P q, with P(w) = 1 + s(1−w). P multiplies the term with (1−β). The effect of B and K_v within H is
+// neglected.
 //
-// With an elastic model of the cell's arm (`arms`), the eigenvalues are those of elastic_loop.hpp instead, the largest
-// of all its poses. What follows applies to C.
+// With `arms`, an elastic model of the cell's arm in several poses, the eigenvalues are those of elastic_loop.hpp, the
+// largest over all poses. The rest of this comment applies to C.
 //
-// An elastic layer (models/surfaces/layer.hpp) that the proxy presses on is a spring along its normal, K_v + k n nᵀ,
-// and what is stable in free motion needn't be stable there. So with `layers` a mass counts as stable only if it is in
-// free motion and in each of these touches; of C the spring is K_v plus the touch's stiffest direction.
+// With `layers`, a mass counts as stable only if it is stable in free motion and on each touch of elastic layers
+// (models/surfaces/layer.hpp). A layer is a spring along its normal, K_v + k n nᵀ; in C the spring is then K_v plus the
+// touch's largest stiffness.
 //
-// C is linear in M: C = M X + Y. So the masses at which a root lies on the unit circle are found by D-decomposition
-// (Neimark): a sweep over θ, w = exp(−jθ), finds where M(θ) = −Y/X is real and positive. Between two neighbouring
-// masses stability doesn't change. This makes "the smallest mass above which all are stable" exact, even if the stable
-// masses form several intervals.
+// C is linear in M: C = M X + Y. D-decomposition (Neimark) finds the masses at which a root lies on the unit circle: a
+// sweep over θ, w = exp(−jθ), for real positive M(θ) = −Y/X. Between two such masses stability doesn't change. So the
+// smallest mass above which all are stable is exact, even if the stable masses form several intervals.
 //
-// For set-up: takes some hundred microseconds, with an arm some milliseconds per mass; allocates, never runs in the
-// cycle.
+// For set-up: some hundred microseconds per mass, with an arm some milliseconds; allocates; not for the cycle.
 #pragma once
 
 #include <array>
@@ -55,76 +53,76 @@ struct HandModel {
 struct LayerTouch {
   std::string what;                              // for messages: "layer 'foam' of 2 kN/m"
   models::Mat3 spring_W = models::Mat3::Zero();  // Σ k n nᵀ of the layers, N/m
-  std::optional<models::Vec3> sticks_along_W{};  // friction holds it but for this normal; none: it slides freely
+  std::optional<models::Vec3> sticks_along_W{};  // friction stops all motion except along this normal; absent: no
+                                                 // friction
 };
 
 struct LoopModel {
   double period_s = 1e-3;              // T > 0
   double delay_s = 0.0;                // L ≥ 0
   double drive_time_constant_s = 0.0;  // τ ≥ 0 of the drives' position loop
-  bool feed_forward = false;           // with arms: the drives follow by feed-forward instead (elastic_loop.hpp)
-  bool either_drive = true;            // with arms: a mass has to be stable with drives of both kinds
-  double handle_mass_kg = 0.0;         // mass after the sensor
+  bool feed_forward = false;           // with arms: the drives follow by feed-forward instead of a lag
+                                       // (elastic_loop.hpp)
+  bool either_drive = true;            // with arms: a mass must be stable with both kinds of drive
+  double handle_mass_kg = 0.0;         // mass behind the sensor
   double damping_Ns_per_m = 0.0;       // B ≥ 0 of the proxy
   double spring_N_per_m = 0.0;         // K_v ≥ 0 of the proxy
   bool explicit_damping = false;       // −B(q₁ − q₂)/T instead of the implicit damping; order 1, for comparison
   int order = 1;
-  // Order 2 steps by (26) where contacts change, at a wall in most of its steps. So a mass counts as stable only if it
-  // is with both. False: free motion alone.
+  // Order 2 steps by (26) where contacts change; at a wall that is most steps. So a mass must be stable with both
+  // methods. False: free motion alone.
   bool with_events = true;
   double horizon_s = 0.0;             // H ≥ 0 of the lookahead
-  double gear_stiffness_ratio = 1.0;  // > 0, of the arms' true gears to those that the controller believes in
-  // With arms: gears that are damped by their torque (gear_damping.hpp); what is measured of it to the true one, and
-  // how much later it is read than is said.
+  double gear_stiffness_ratio = 1.0;  // > 0: the arms' true gear stiffness over the controller's value
+  // With arms: gears damped by their torque (gear_damping.hpp); the ratio of measured to true torque; how much later
+  // than declared the torque is read.
   GearDampingChoice gear_damping{};
   double gear_torque_ratio = 1.0, gear_torque_late_s = 0.0;
-  // 1/ω ≥ 0 of the setpoints' filter, whose 2/ω are part of delay_s. It is used when a horizon is chosen: the filter is
-  // modelled there as the two first-order lags that it is. Lookahead compensates for their phase; a pure delay would
-  // seem worse.
+  // 1/ω ≥ 0 of the setpoint filter; delay_s includes its 2/ω. When a horizon is chosen, the filter is modelled as two
+  // first-order lags, because lookahead compensates their phase better than a pure delay's.
   double filter_s = 0.0;
-  std::shared_ptr<const std::vector<ElasticArm>> arms{};    // in all poses that count; null: rigid
-  std::shared_ptr<const std::vector<LayerTouch>> layers{};  // beside free motion; null: none
+  std::shared_ptr<const std::vector<ElasticArm>> arms{};    // one for each pose that is judged; null: rigid arm
+  std::shared_ptr<const std::vector<LayerTouch>> layers{};  // judged in addition to free motion; null: none
 };
 
-// Compared with the simulated arm, the smallest stable masses of elastic loops are off by −8 to 15 %, so a twentieth
-// more is asked for.
+// Against the simulated arm, the smallest stable masses of elastic loops are off by −8 to 15 %, so 5 % more is
+// required.
 inline constexpr double elastic_margin = 1.05;
 
-// Up to two significant digits, as the smallest masses and inertias are told.
+// Rounds up to two significant digits, as smallest masses and inertias are reported.
 double round_up(double mass);
 
-// The largest |z|; the loop is stable below 1. M is the proxy's (felt mass less the handle's), > 0.
+// Returns the largest |z|; the loop is stable below 1. proxy_mass_kg: felt mass less the handle's, > 0.
 double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
 
-// The proxy's mass above which every mass up to max_mass_kg is stable; nullopt if max_mass_kg itself isn't. At least
-// 1e-6 kg.
+// Returns the proxy's mass, kg, above which every mass up to max_mass_kg is stable, at least 1e-6; nullopt if
+// max_mass_kg itself is unstable.
 std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopModel& loop, double max_mass_kg = 1000.0);
 
-// The margins of an advice. It holds for the hand as described and for one 1.5 times as stiff and as heavy, and for the
-// delay as it is and 1.2 times as long.
+// Margins of an advised mass: it is stable with the given hand and one 1.5 times as stiff and as heavy, and with the
+// given delay and one 1.2 times as long.
 inline constexpr double hand_margin = 1.5, delay_margin = 1.2;
-// Whether `holds` is true for all of these hands and loops.
+// Returns whether `holds` is true for all combinations of these hands and delays.
 bool with_margins(const HandModel& hand, const LoopModel& loop,
                   const std::function<bool(const HandModel&, const LoopModel&)>& holds);
 
-// Gears from softer to stiffer than the controller believes.
+// True gear stiffness over the controller's value: the range that a loop must tolerate.
 inline constexpr std::array<double, 3> gear_margins{0.7, 1.0, 1.4};
-// The horizon that `--lookahead auto` takes for this mass, in whole periods. It is the longest one, of at most
-// `auto_share` of the loop's delay, with which no loop is unstable that is stable without, and none more than the worst
-// of them is without: neither with the hand as described nor with one hand_margin times as stiff or heavy_hand times as
-// heavy, with the delay as it is and, the filter's apart, delay_margin times as long, with each of gear_margins, in
-// each pose. Beyond auto_share, the felt mass gets worse again. With the twentieth that elastic loops ask for beside,
-// heavy_hand is twice. Precondition: loop.filter_s is the filter's.
+// Returns the horizon that `--lookahead auto` takes for this mass, s, in whole periods. It is the longest, up to
+// `auto_share` of the loop's delay, that makes no stable loop unstable and no unstable loop worse than the worst one
+// without lookahead. This is checked for all combinations of: each pose; the given hand, hand_margin times as stiff,
+// heavy_hand times as heavy; the given delay and, except for the filter's part, delay_margin times as long; each of
+// gear_margins. Beyond auto_share the felt mass gets worse again. Together with elastic_margin, heavy_hand makes a
+// factor of two. Precondition: loop.filter_s is set.
 inline constexpr double auto_share = 0.85, heavy_hand = 1.9;
 double stable_horizon_s(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
 
-// What a loop that damps its gears by their torque has to hold with, each alone: torques that are measured a fifth too
-// large and so much later than is said; gears as soft as gear_margins says. (Torques that are a fifth too small ask for
-// less than those.)
+// Errors that a loop with torque-damped gears must tolerate, one at a time: torques measured a fifth too large and 2 ms
+// late; gears as soft as gear_margins.front(). (Torques a fifth too small are less critical.)
 inline constexpr double torque_margin = 0.2, late_torque_s = 0.002;
-// The κ of gear damping that a session takes, of the joints that `loop` names: that of these with which the smallest
-// mass is stable. The gears themselves have to come to rest with it, under a proxy so heavy that the hand doesn't
-// matter, with these margins and as stiff as gear_margins says. 0: no κ holds, or none makes a lighter mass stable.
+// Returns the gear damping κ, 1/s, of a session for the joints in `loop.gear_damping`: the tried value with the
+// smallest stable mass. The gears must also come to rest with it under proxies of 10 and 50 kg, in a hand heavy_hand
+// times as heavy, and with gears as stiff as gear_margins.back(). 0: no κ does, or none makes a lighter mass stable.
 inline constexpr std::array<double, 7> tried_gear_dampings_per_s{220.0, 180.0, 140.0, 100.0, 70.0, 40.0, 20.0};
 double best_gear_damping_per_s(const HandModel& hand, const LoopModel& loop);
 
@@ -132,34 +130,33 @@ double best_gear_damping_per_s(const HandModel& hand, const LoopModel& loop);
 struct DampedMass {
   double damping_Ns_per_m = 0.0, mass_kg = 0.0;
 };
-// The dampings that are tried, Ns/m: by hand a heavier handle from about 5 on, honey from 50 on.
+// Dampings that are tried, Ns/m. From about 5 on they feel like a heavier handle, from 50 on like honey.
 inline constexpr std::array<double, 9> tried_dampings{1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0};
-// The least of them, times `unit` and above the loop's own, for which `smallest` finds a mass of at most `most_kg`.
+// Returns the smallest tried damping, times `unit` and above the loop's own, for which `smallest` returns at most
+// `most_kg`.
 std::optional<DampedMass> least_damping(const LoopModel& loop, double most_kg,
                                         const std::function<std::optional<double>(const LoopModel&)>& smallest,
                                         double unit = 1.0);
 
-// What a layer asks for beyond free motion.
+// A layer that requires more mass than free motion.
 struct LayerLimit {
-  std::string what;               // of the touch
-  std::optional<double> mass_kg;  // the proxy's, the smallest that is stable there; absent: none is
+  std::string what;               // LayerTouch::what
+  std::optional<double> mass_kg;  // smallest stable mass of the proxy there; absent: no mass is stable
 };
-// The touch that asks for most mass. Absent: free motion asks for as much.
+// Returns the touch that requires the largest mass; absent: free motion requires as much.
 std::optional<LayerLimit> decisive_layer(const HandModel& hand, const LoopModel& loop);
 
-// The loop with the two layers on which this mass is the least stable: where it is asked dozens of times, for the sake
-// of time.
+// Returns the loop with only the two layers on which this mass is least stable; saves time where many loops are judged.
 LoopModel with_worst_layers(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
 
-// The check of --mass. Throws description::SetupError that names the smallest stable felt mass (proxy and handle),
-// rounded up to two digits, and the damping with which the mass that is wanted is stable; if none is without damping,
-// the least damping with which some is. It names the layer if one asks for more than free motion does. Also for a mass
-// at or below the handle's. With `force_unstable` only the latter is checked.
+// The check of --mass. Throws description::SetupError if the felt mass (proxy and handle) is unstable, or not above the
+// handle's; with `force_unstable` only for the latter. The error names the smallest stable felt mass, rounded up to two
+// digits, a damping with which the wanted mass is stable, and the layer that requires more than free motion. If no mass
+// is stable, it names the smallest damping with which some mass is.
 void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable);
 
-// The check of --inertia, which is the same question about the tool's rotation: `hand` and `loop` hold the hand's
-// turning stiffness, damping and inertia, the handle's inertia, and the proxy's rotational damping and spring, in
-// Nm/rad, Nms/rad and kg m²; `loop.arms` are elastic_turning_arm()'s.
+// The check of --inertia: the same for the tool's rotation. The fields of `hand` and `loop` are then rotational, in
+// Nm/rad, Nms/rad and kg m²; `loop.arms` come from elastic_turning_arm().
 void require_stable_inertia(double felt_inertia_kg_m2, const HandModel& hand, const LoopModel& loop,
                             bool force_unstable);
 

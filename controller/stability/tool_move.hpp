@@ -1,5 +1,5 @@
-// By what way and angle a tool has moved in a period, about its rendered point, in W: as its links are taken to move,
-// and as the motors do (link_motion.hpp). Both at the time of the force that is there now.
+// Displacement and rotation of a tool in one period, about its rendered point, in W: by the model of its links, and by
+// the motors (link_motion.hpp). Both at the time of the present force.
 #pragma once
 
 #include "models/geometry/tool_pose.hpp"

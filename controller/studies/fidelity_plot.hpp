@@ -1,4 +1,4 @@
-// The fidelity study's plots, and the sentences that they answer with.
+// The fidelity study's plots, and their titles, which state the result.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,8 @@
 
 namespace proxarm::studies {
 
-// Up to which frequency what is drawn feels within 10 %, at worst over directions: of one mass without anything, with
-// lookahead and with measured torque; of all inertias of a tool that turns.
+// The frequencies up to which the drawn setups feel right within 10 % in the worst direction: one mass plain, with
+// lookahead and with measured torque; and all inertias of a tool that turns.
 std::string fidelity_answer(const Table& table);
 std::string fidelity_turning_answer(const Table& table);
 

@@ -22,14 +22,14 @@ using nlohmann::json;
 using Vec2 = Vec<2>;
 
 struct Law {
-  const char *name, *title;  // the paper's number, and in the picture
+  const char *name, *title;  // the paper's number; the title in the picture
   ImpedanceLaw law;
 };
 constexpr std::array<Law, 3> laws{{{"1", "spring alone", ImpedanceLaw::plain},
                                    {"5", "spring and damper", ImpedanceLaw::damped_motion},
                                    {"23", "implicit, default", ImpedanceLaw::implicit}}};
 
-// A force that is none.
+// Smaller forces count as 0.
 constexpr double nothing_N = 1e-3;
 
 constexpr double above_m = 0.015, below_m = -0.020, rub_m = 0.03;
@@ -108,7 +108,7 @@ json Figure5::headline(const Table& table, const Options& /*options*/) const {
       most_pull = std::max(most_pull, -f_y);
       most_kick = std::max(most_kick, std::abs(f_x) - setup.friction * f_y);
       if (touch_s < 0.0 && f_y > 0.0) touch_s = t;
-      // From well after the touch until the rubbing: the hand rests, and so should the force.
+      // From well after the touch until the rubbing the hand rests, and so should the force.
       if (t < press_to_s + 0.3 || t > rub_from_s - 0.05) continue;
       low = any ? std::min(low, f_y) : f_y;
       high = any ? std::max(high, f_y) : f_y;
@@ -139,7 +139,7 @@ json Figure5::headline(const Table& table, const Options& /*options*/) const {
 
 namespace {
 
-// A row of the picture: a signal, for each law.
+// A row of the picture: one signal for each law.
 struct Signal {
   const char *column, *label;
   double factor, low, high, tick;
@@ -151,7 +151,7 @@ constexpr std::array<Signal, 5> signals{{{"tool_x_m", "p_x (mm)", 1e3, -40, 40, 
                                          {"force_y_N", "f_y (N)", 1.0, -2, 16, 5},
                                          {"force_y_N", "f_y (N)", 1.0, -0.7, 0.7, 0.5, 4.1, 4.7}}};
 
-// One law's signal over time. Points that couldn't be told apart at half the size aren't drawn.
+// One law's signal over time. Leaves out points that couldn't be distinguished at half the size.
 Curve curve_of(const Table& table, const Law& law, const Signal& signal) {
   const std::size_t of = table.column("law"), time = table.column("time_s"), column = table.column(signal.column);
   Curve curve;
@@ -168,7 +168,7 @@ Curve curve_of(const Table& table, const Law& law, const Signal& signal) {
   return curve;
 }
 
-// Of the force off the wall: where it is least, which is below 0 where the wall pulls.
+// Marks the least force while the tool leaves the wall; below 0 the wall pulls.
 Note pull_note(const Curve& f_y) {
   const auto least = std::ranges::min_element(f_y.y);
   if (least == f_y.y.end()) return {};
@@ -177,7 +177,7 @@ Note pull_note(const Curve& f_y) {
   return {t, *least, "pull " + number_text(-*least, 3) + " N", Note::Side::right};
 }
 
-// By how much the force swings while the hand rests.
+// States by how much the force swings while the hand rests.
 Note swing_note(double oscillation_N, const Curve& f_y) {
   const double t = 0.5 * (press_to_s + 0.3 + rub_from_s);
   if (oscillation_N < nothing_N) return {t + 0.4, 6.0, "steady", Note::Side::on, false};

@@ -32,8 +32,8 @@ double elapsed_ns(Clock::time_point begun) {
   return std::chrono::duration<double, std::nano>(Clock::now() - begun).count();
 }
 
-// The time of a step, along a small circle around `at`, each pushed by `push`: the best of forty rounds, so short that
-// on a busy machine most are undisturbed. NaN where a push meets nothing.
+// The time of a step along a small circle around `at`, with `push` in each step: the best of forty rounds, which are so
+// short that most run undisturbed even on a busy machine. NaN if the push meets no object.
 double step_ns(models::GeometricAlgorithm<3>& g, const Vec3& at, const Vec3& push, int steps) {
   double best = std::numeric_limits<double>::infinity();
   for (int round = 0; round < 40; ++round) {
@@ -46,14 +46,15 @@ double step_ns(models::GeometricAlgorithm<3>& g, const Vec3& at, const Vec3& pus
       q = g(coupling_N_per_m, q + ahead + push, q);
     }
     best = std::min(best, elapsed_ns(begun) / steps);
-    // Free space: the push alone leads 5 µm further down in each step.
+    // In free space the push moves the proxy 5 µm further down in each step.
     const bool fell = push.z() < 0.0 && at.z() - q.z() > 0.5 * steps * std::abs(push.z());
     if (!q.allFinite() || fell) return not_measured;
   }
   return best;
 }
 
-// `count` spheres of radius 0.4 of their distance, on a grid of 1 m around the origin; the first one at the origin.
+// `count` spheres on a grid of 1 m around the origin, with a radius of 0.4 of their distance; the first one is at the
+// origin.
 Scene spheres(std::size_t count) {
   Scene scene;
   const auto side = static_cast<int>(std::ceil(std::cbrt(static_cast<double>(count))));
@@ -69,7 +70,7 @@ Scene spheres(std::size_t count) {
   return scene;
 }
 
-// A sphere of 0.2 m as a mesh of about `count` triangles; its poles, vertices of many, lie along x.
+// A sphere of 0.2 m as a mesh of about `count` triangles. Its poles, vertices of many triangles, lie along x.
 Scene globe(std::size_t count) {
   const auto rings = static_cast<std::uint32_t>(std::max(2.0, std::sqrt(static_cast<double>(count) / 4.0)));
   Scene scene;
@@ -82,7 +83,7 @@ Scene globe(std::size_t count) {
   return scene;
 }
 
-// Asks every object for its distance, which is the least that a step costs where no object is skipped.
+// The time to compute the distance of every object: the least that a step costs if it skips none.
 double all_ns(const Scene& scene, const Vec3& at) {
   double best = std::numeric_limits<double>::infinity();
   if (const auto* mesh = std::get_if<scenes::MeshShape>(&scene.objects.front().shape)) {
@@ -180,7 +181,7 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   std::string kind = "option", name;
   Scene scene;
   double count = 0.0;
-  Vec3 surface = Vec3::Zero();  // a point on something, seen from above
+  Vec3 surface = Vec3::Zero();  // a point on an object, seen from above
   if (job < objects.size()) {
     kind = name = "objects";
     scene = spheres(objects[job]);
@@ -206,7 +207,7 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   const double gap = count > 1.0 && kind == "objects" ? 0.05 * surface.z() : 1e-3;
   const double far = step_ns(g, Vec3(0.3, 0.2, 20.0), none, steps);
   const double near = step_ns(g, surface + Vec3(0.0, 0.0, gap), none, steps);
-  // Found from above, since a coarse mesh lies below its sphere.
+  // Searched from above, since a coarse mesh lies below its sphere.
   const double depth = std::max(0.5 * surface.z(), 1e-3);
   const Vec3 down =
       empty ? surface : g(coupling_N_per_m, surface - depth * Vec3::UnitZ(), surface + 1e-3 * Vec3::UnitZ());
@@ -271,7 +272,7 @@ json Skip::headline(const Table& table, const Options& /*options*/) const {
 
 namespace {
 
-// Of the worlds of one kind, by their number of objects or triangles.
+// Costs of a kind of world, by number of objects or triangles.
 struct Cost {
   double free_ns = 0.0, contact_ns = 0.0, all_ns = 0.0;
 };
@@ -289,7 +290,6 @@ CostByCount costs_of(const Table& table, const char* kind) {
 
 std::string ns_text(double ns) { return count_text(ns) + " ns"; }
 
-// Three curves, each with its name beside it, and rings at the largest world and where a step takes longest.
 Panel cost_panel(const CostByCount& costs, const char* title, const char* what) {
   Panel panel{.title = title,
               .x_label = std::string("number of ") + what,

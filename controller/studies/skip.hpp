@@ -1,11 +1,9 @@
-// What a step and start-up cost against the size of a world: objects that are far away must not cost anything.
+// Measures the cost of a step and of start-up against the size of a world: distant objects must cost nothing.
 //
-// The worlds have 1 to thousands of spheres on a grid, or meshes of up to a hundred thousand triangles. The proxy is
-// far from all, near one, or slides on one; the cost is compared with evaluating every object at every step. The study
-// also measures what each option of a scene costs when it is used. Unused it must cost nothing, since the 𝒢 is compiled
-// without it. Of whole cycles it counts what they compute around 𝒢, and how often they can leave it out.
-//
-// The caller provides the cycles: the studies know no arm.
+// The worlds have one to thousands of spheres on a grid, or meshes of up to a hundred thousand triangles. The proxy is
+// far from all objects, near one, or slides on one; evaluating every object in every step is the comparison. The study
+// also measures each option of a scene; unused options cost nothing, since 𝒢 is compiled without them. For whole cycles
+// it counts what they compute around 𝒢 and how often they skip it. The caller provides the cycles.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +14,13 @@
 
 namespace proxarm::studies {
 
-// A session of the simulated arm; its files as the source tree has them, empty for the default ones.
+// A session of the simulated arm. Files are named as in the source tree; empty: the default ones.
 struct CycleSetup {
   const char* name = "";
   const char *cell = "", *scene = "", *hand = "";
   bool looks_ahead = false;  // --lookahead auto
 };
-// Counts over its steps of rendering; controller/motion/motion_work.hpp says what they are.
+// Counts over the session's rendering steps, explained in controller/motion/motion_work.hpp.
 struct CycleCounts {
   std::uint64_t steps = 0, programs = 0, limited = 0, joint_steps = 0, guarded = 0;
 };
@@ -45,7 +43,7 @@ class Skip final : public Study {
   CycleRun cycles_;
 };
 
-// The plot's title: what a step takes in the largest worlds, and whether their size matters.
+// The plot's title: the time of a step in the largest worlds, and whether their size matters.
 std::string skip_answer(const Table& table);
 
 }  // namespace proxarm::studies

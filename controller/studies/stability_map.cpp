@@ -27,8 +27,8 @@ using Vec1 = Vec<1>;
 
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
-// Simulates drive, delay and hand of controller/stability/stability.hpp: from the proxy's position to the force that
-// the sensor will read at the next step.
+// Simulates drive, delay and hand of controller/stability/stability.hpp, from the proxy's position to the force that
+// the sensor reads at the next step.
 class LinearPlant {
  public:
   LinearPlant(const HandModel& hand, const LoopModel& loop, double intention_m, double start_m)
@@ -45,14 +45,14 @@ class LinearPlant {
     grip_.assign(static_cast<std::size_t>(whole) + 2, K_ * (start_m - intention_m));
   }
 
-  // The proxy is at q(k); returns h(k + 1).
+  // Takes the proxy's q(k); returns h(k + 1).
   double operator()(double q) noexcept {
     p2_ = p1_;
     p1_ = p_;
     p_ = (1.0 - beta_) * q + beta_ * p_;
     const double grip = K_ * (p_ - intention_) + D_ * (p_ - p1_) + m_ * (p_ - 2.0 * p1_ + p2_);
     grip_[next_] = grip;
-    // The oldest and the one after it.
+    // The oldest sample and the next one.
     const std::size_t oldest = next_ + 1 == grip_.size() ? 0 : next_ + 1;
     const std::size_t younger = oldest + 1 == grip_.size() ? 0 : oldest + 1;
     next_ = oldest;
@@ -76,18 +76,17 @@ controller::AdmittanceConfig config(const LoopModel& loop, double mass_kg) {
   return config;
 }
 
-// Of runs that say no more than the sign.
+// Rates returned if a run tells only the sign.
 constexpr double blew_up = 1e3, died = -1e3;
 
-// ln r of the motion recorded from the share `from` on: the slope, by least squares, of half of
-// ln(q(k)² − q(k+s) q(k−s)).
+// ln r of the recorded motion from the share `from` on: half the least-squares slope of ln(q(k)² − q(k+s) q(k−s)).
 double slope(const std::vector<double>& q, double from) {
   const auto begin = static_cast<std::size_t>(from * static_cast<double>(q.size()));
   int crossings = 0;
   for (std::size_t k = begin + 1; k < q.size(); ++k) crossings += (q[k] < 0.0) != (q[k - 1] < 0.0) ? 1 : 0;
   const double theta = std::numbers::pi * crossings / static_cast<double>(q.size() - begin - 1);
-  // sin(sθ) must not vanish: near the Nyquist frequency (θ = π) that takes a stride s of several steps. At Nyquist
-  // itself there is none, and the size of q itself is taken.
+  // sin(sθ) must not vanish: near the Nyquist frequency (θ = π) that takes a shift s of several steps. At the Nyquist
+  // frequency itself no s exists, and |q| is used.
   std::size_t s = 0;
   const auto most = std::min<std::size_t>((q.size() - begin) / 4, 20'000);
   for (std::size_t i = 1; i <= most && s == 0; ++i) {
@@ -109,24 +108,24 @@ double slope(const std::vector<double>& q, double from) {
   return spread > 0.0 ? (n * sum_xy - sum_x * sum_y) / spread : 0.0;
 }
 
-// Measures the rate ln|z| per step at which the slowest mode grows (positive: unstable) or fades.
+// Measures the rate ln|z| per step at which the slowest mode grows (positive: unstable) or decays.
 //
-// Where one mode A rᵏ cos(kθ + φ) is left, q(k)² − q(k+s) q(k−s) = A² r²ᵏ sin²(sθ) whatever its phase: a straight line
-// ln r² over k. The simulation goes on, twice as long each time, until the last quarter of that line is as steep as
-// its second half, within `share`, and the motion has grown or faded e⁸ times: a mode that does the opposite would show
-// by then if it had begun a three-thousandth as large.
+// Once a single mode A rᵏ cos(kθ + φ) is left, q(k)² − q(k+s) q(k−s) = A² r²ᵏ sin²(sθ) at any phase, so its logarithm
+// is a straight line over k with slope ln r². The simulation doubles its length until the slope of the last quarter
+// equals that of the second half within `share`, and the motion has grown or decayed by e⁸. By then a mode of the
+// opposite trend would show even if it started 3000 times smaller.
 double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
   constexpr double start = 1e-3, share = 0.005, folds = 8.0;
   constexpr int most_steps = 100'000;
   models::FreeSpace<1> nothing;
   AdmittanceProxy<1> proxy(config(loop, mass_kg), nothing);
-  // The hand wants 0; the proxy is released from rest away from it.
+  // The hand's target is 0; the proxy is released from rest at a distance.
   proxy.start({.q = Vec1(start)});
   static_cast<void>(proxy.set_reference(Vec1::Zero()));
   LinearPlant plant(hand, loop, 0.0, start);
   double h = plant.first_force();
-  // A release from rest hardly excites what is near the Nyquist frequency. A force that pulls the proxy aside by as
-  // much for one step excites all modes alike.
+  // A release from rest hardly excites modes near the Nyquist frequency. A force that moves the proxy aside by the same
+  // distance for one step excites all modes alike.
   const double aside = mass_kg / (loop.period_s * loop.period_s) * start;
   const std::array<double, 3> kick{aside, -2.0 * aside, aside};
   std::vector<double> q{start};
@@ -154,12 +153,12 @@ double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
 }
 
 struct Contact {
-  double bounces = 0.0;      // how often it touches in the last third
-  double amplitude_m = 0.0;  // of the proxy in it, peak to peak
-  double growth = 0.0;       // that by what it was in the third before; 0 where it settles
+  double bounces = 0.0;      // number of touches in the last third
+  double amplitude_m = 0.0;  // of the proxy in the last third, peak to peak
+  double growth = 0.0;       // ratio to the amplitude in the third before; 0 if it settles
 };
 
-// The hand means to be 20 mm behind a wall that is 10 mm away.
+// The hand's target is 20 mm behind a wall that is 10 mm away.
 Contact push_against_wall(const HandModel& hand, const LoopModel& loop, double mass_kg) {
   constexpr double start = 0.01, intention = -0.02;
   models::Plane<1> wall(Vec1(0.0), Vec1(1.0));
@@ -189,11 +188,11 @@ Contact push_against_wall(const HandModel& hand, const LoopModel& loop, double m
   return contact;
 }
 
-// What is tried at walls, as multiples of the smallest stable mass, from light to heavy.
+// Masses tried at walls, as multiples of the smallest stable mass.
 constexpr std::array<double, 8> wall_multiples{1.02, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 2.0};
 
-// The multiple from which on nothing grows at the wall: the lightest such that it doesn't with it nor with any heavier
-// one. Infinite where it does with the heaviest.
+// The least multiple of the smallest mass from which on bouncing at the wall doesn't grow, with it and with all larger
+// ones tried. Infinite if it grows with the largest.
 double bears_walls_from(const HandModel& hand, const LoopModel& loop, double smallest_kg) {
   double from = std::numeric_limits<double>::infinity();
   for (std::size_t i = wall_multiples.size(); i-- > 0;) {
@@ -230,7 +229,7 @@ struct Grid {
   }
 };
 
-// The largest relative error of the smallest stable mass, found by eigenvalues, against its closed form for L = 0.
+// The largest relative error of the smallest stable mass from eigenvalues, against its closed form for L = 0.
 double d1_error() {
   double worst = 0.0;
   for (const double T : decades(1e-4, 1e-2, 9)) {
@@ -266,7 +265,7 @@ double measured_boundary_kg(const HandModel& hand, const LoopModel& loop, double
     at_high = growth(hand, loop, high);
   }
   if (!(at_low > 0.0 && at_high < 0.0)) return nan_value;
-  // Bisection rather than regula falsi: the rate has a bend where another mode becomes the slowest.
+  // Bisection instead of regula falsi, because the rate has a kink where another mode becomes the slowest.
   for (int i = 0; i < 7; ++i) {
     const double middle = std::sqrt(low * high);
     (growth(hand, loop, middle) > 0.0 ? low : high) = middle;
@@ -318,8 +317,8 @@ std::vector<Row> StabilityMap::run(std::size_t job, const Options& options) cons
       stiffer.stiffness_N_per_m *= 1.01;
       const auto other = controller::smallest_stable_mass(stiffer, loop);
       sensitivity = other ? std::abs(std::log(*other / *predicted)) / std::log(1.01) : 1e3;
-      // From a guess that is up to 2.7 % off, by another share at each point: where it were the prediction itself, a
-      // right one would always end in the same place of the bisection's last interval.
+      // The guess is off by up to 2.7 %, differently at each point. If it were the prediction itself, a correct
+      // prediction would always end at the same place of the bisection's last interval.
       const double share = std::fmod(static_cast<double>(job * grid.K.size() + i) * 0.6180339887498949, 1.0);
       measured = measured_boundary_kg(hand, loop, *predicted * std::pow(1.03, 1.8 * (share - 0.5)));
       if ((job + i) % 10 == 0 && predicted_at_walls) {
@@ -327,7 +326,7 @@ std::vector<Row> StabilityMap::run(std::size_t job, const Options& options) cons
         bears_from = bears_walls_from(hand, loop, *predicted_at_walls);
       }
     } else {
-      // Compares measured and predicted rate at a mass whose oscillation takes some hundred steps.
+      // Compares measured and predicted rate at a mass that oscillates with a period of some hundred steps.
       const double mass = std::clamp(hand.stiffness_N_per_m * std::pow(40.0 * loop.period_s, 2), 1e-2, 1000.0);
       const bool grows = growth(hand, loop, mass) > 0.0;
       measured = grows == (controller::spectral_radius(hand, loop, mass) > 1.0) ? -1.0 : 0.0;

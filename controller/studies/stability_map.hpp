@@ -1,17 +1,16 @@
-// The smallest stable mass over timestep, hand, delay and drive: predicted from eigenvalues
+// Maps the smallest stable mass over timestep, hand, delay and drive: predicted from eigenvalues
 // (controller/stability/stability.hpp), and measured by running the controller's own proxy against the same linear
-// plant until the motion has grown or shrunk.
+// plant.
 //
-// Measured: in free motion, the rate at which the oscillation grows or fades once its slowest mode is left; the mass at
-// which it does neither is found by halving. A point is ill-conditioned where a per cent of the hand's stiffness moves
-// the boundary by more than three (|∂ln M/∂ln K_h| ≥ 3).
+// In free motion, the rate of growth or decay is measured once only the slowest mode is left; bisection finds the mass
+// at which it is 0. A point is ill-conditioned if 1 % of the hand's stiffness moves the boundary by 3 % or more (|∂ln
+// M/∂ln K_h| ≥ 3).
 //
-// At every tenth point the proxy also meets a wall, with the hand pushing on: does it settle, make and break contact
-// for good, or diverge? Order 2 steps by (26) at contacts, so the mass that is stable there is the larger of both.
-// Eigenvalues know no impacts: the hand's mass m_h answers one with a pulse that comes round after the loop's delay,
-// m_h/M as large, and where m_h/M is nearly 1 the next impact adds to what is left of it. So the multiple of the
-// smallest mass from which on nothing grows is found by simulation, and a mass is called stable at walls from
-// `wall_margin` times the smallest on.
+// At every tenth point the hand also pushes the proxy against a wall, where it may settle, bounce without end, or
+// diverge. Order 2 steps by (26) at contacts, so the larger of the two stable masses counts there. Eigenvalues don't
+// include impacts: the hand's mass m_h answers one with a pulse of size m_h/M, which returns after the loop's delay,
+// and with m_h/M near 1 the next impact adds to the rest of it. So simulation finds the multiple of the smallest mass
+// from which on bouncing doesn't grow.
 #pragma once
 
 #include "controller/stability/stability.hpp"
@@ -21,7 +20,7 @@ namespace proxarm::studies {
 
 class StabilityMap final : public Study {
  public:
-  // From that many times the smallest stable mass on a mass is called stable at walls.
+  // A mass counts as stable at walls from this multiple of the smallest stable mass on.
   static constexpr double wall_margin = 1.5;
 
   std::string name() const override { return "stability"; }
@@ -35,7 +34,7 @@ class StabilityMap final : public Study {
   bool failed(const nlohmann::json& headline) const override;
 };
 
-// The boundary next to `guess_kg`, measured; not finite where no growth changed sign within a factor of four.
+// The measured boundary near `guess_kg`; NaN if the growth doesn't change sign within a factor of four.
 double measured_boundary_kg(const controller::HandModel& hand, const controller::LoopModel& loop, double guess_kg);
 
 }  // namespace proxarm::studies

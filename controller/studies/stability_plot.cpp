@@ -13,10 +13,10 @@
 namespace proxarm::studies {
 namespace {
 
-// What is drawn of the map: (26) with drives of 100 Hz.
+// The drawn part of the map: (26) with drives of 100 Hz.
 constexpr double drawn_order = 1.0, drawn_drive_s = 1.6e-3;
 
-// How the handle is held that is drawn.
+// The drawn grip of the handle.
 constexpr double hand_kg = 1.0, hand_Ns_per_m = 20.0;
 
 class Points {
@@ -39,7 +39,6 @@ class Points {
   [[nodiscard]] bool is_drawn(std::size_t row) const {
     return table_.number(row, order_) == drawn_order && table_.number(row, drive_) == drawn_drive_s;
   }
-  // All values of a column among the drawn points.
   [[nodiscard]] std::vector<double> grid(const char* name) const {
     std::set<double> values;
     for (std::size_t row = 0; row < table_.rows(); ++row) {
@@ -56,7 +55,7 @@ class Points {
 // The mass that is enough for a hand up to some stiffness, at one timestep and delay.
 struct Enough {
   double period_s = 0.0, delay_s = 0.0, mass_kg = 0.0, up_to_N_per_m = 0.0;
-  bool all = true;  // of the stiffnesses that were tried
+  bool all = true;  // true: enough for all stiffnesses that were tried
 };
 
 Enough enough_of(const Table& table, double delay_s) {
@@ -65,7 +64,7 @@ Enough enough_of(const Table& table, double delay_s) {
   for (const double T : points.grid("period_s")) {
     if (std::abs(T - 1e-3) < std::abs(found.period_s - 1e-3)) found.period_s = T;
   }
-  std::map<double, double> smallest_kg;  // by the hand's stiffness; below 0: there is none
+  std::map<double, double> smallest_kg;  // by the hand's stiffness; negative: no stable mass
   for (std::size_t row = 0; row < table.rows(); ++row) {
     if (!points.is_drawn(row, found.delay_s) || points.value(row, "period_s") != found.period_s) continue;
     smallest_kg[points.value(row, "stiffness_N_per_m")] = points.value(row, "predicted_kg");
@@ -81,7 +80,6 @@ Enough enough_of(const Table& table, double delay_s) {
   return found;
 }
 
-// The stiffest hand.
 std::string limit_text(const Enough& limit) {
   return number_text(limit.up_to_N_per_m, 3) + " N/m" + (limit.all ? " and more" : "");
 }
@@ -90,7 +88,7 @@ std::string milliseconds(double s) { return number_text(1e3 * s, 2) + " ms"; }
 
 std::string delay_text(double delay_s) { return delay_s > 0.0 ? "T + " + milliseconds(delay_s) : "T alone"; }
 
-// At most three delays, the shortest and the longest among them.
+// At most three delays, with the shortest and the longest.
 std::vector<double> drawn_delays(const Points& points) {
   const std::vector<double> all = points.grid("delay_s");
   if (all.size() <= 3) return all;
@@ -142,12 +140,11 @@ MapChart stability_chart(const Table& table) {
   return chart;
 }
 
-// A point whose measured and predicted smallest mass were compared.
 struct Compared {
   double sensitivity, error;
 };
 
-// What a test grants measured and predicted mass to differ by.
+// Relative difference between measured and predicted mass that a test permits.
 constexpr double tolerance = 0.02;
 
 struct Agreement {
@@ -172,12 +169,12 @@ Agreement agreement_of(const Table& table) {
   return all;
 }
 
-// One in so many points is drawn.
+// One of this many points is drawn.
 std::size_t thinning(std::size_t points) { return points / 2500 + 1; }
 
 Chart agreement_chart(const Table& table) {
   const Agreement all = agreement_of(table);
-  constexpr double least_x = 1e-4, most_x = 9.0, least_y = 2e-7;  // beyond: drawn there
+  constexpr double least_x = 1e-4, most_x = 9.0, least_y = 2e-7;  // points beyond are drawn at these borders
   const auto thin = thinning(all.good.size());
   const auto dots = [&](const std::vector<Compared>& list, const std::string& name, int style, std::size_t each) {
     Curve curve{.name = name, .style = style, .marks = true, .line = false, .mark_size = 0.4};

@@ -1,4 +1,4 @@
-// The stability map's plots, and the sentences that they answer with.
+// The stability map's plots, and their titles, which state the result.
 #pragma once
 
 #include <filesystem>
@@ -9,14 +9,14 @@
 
 namespace proxarm::studies {
 
-// Sensitivities of the boundary from which on measured and predicted mass aren't compared.
+// Measured and predicted mass are compared only below this sensitivity of the boundary.
 inline constexpr double well_conditioned = 3.0;
 
-// The mass that is stable with the heaviest hand at the longest delay, at the timestep next to 1 ms: up to which
-// stiffness of the hand, and from which on none is.
+// For each drawn delay the hand's stiffness up to which some mass is stable, with a hand of 1 kg and 20 Ns/m at the
+// timestep nearest to 1 ms.
 std::string stability_answer(const Table& table);
 
-// By how much the smallest mass that was measured differs from the predicted one, and of how many points.
+// The largest difference between measured and predicted smallest mass, and the number of points.
 std::string agreement_answer(const Table& table);
 
 // Writes stability.svg and stability_agreement.svg. Returns warnings.

@@ -1,4 +1,4 @@
-// Finds a study by its name.
+// Lists all studies and finds one by its name.
 #pragma once
 
 #include <memory>
@@ -13,10 +13,10 @@ namespace proxarm::studies {
 
 using StudyList = std::vector<std::unique_ptr<Study>>;
 
-// `arm` and `cycles` run the simulated arm for the studies that want it.
+// `arm` and `cycles` run the simulated arm for the studies that need it.
 StudyList all_studies(const ArmRun& arm, const CycleRun& cycles);
 
-// Throws description::SetupError that names the studies there are.
+// Throws description::SetupError that lists the studies.
 const Study& study_named(const StudyList& list, const std::string& name);
 
 }  // namespace proxarm::studies

@@ -1,4 +1,4 @@
-// The way on which every part of the cycle reports a fault: it is dated and given to the supervisor.
+// Reports a fault to the supervisor, with the number of the cycle. All parts of the cycle use it.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ class Alarm {
     if (supervisor_.reaction(fault) == Reaction::hold) state_.hold_raised = true;
     supervisor_.raise({fault, where, cycle_, value, limit});
   }
-  // A force that stands on the handle at the start.
+  // A force on the handle during the tare.
   void raise_standing(const models::Vec3& force_W, double limit_N) noexcept {
     supervisor_.raise({.fault = Fault::force_at_start,
                        .cycle = cycle_,
@@ -27,7 +27,7 @@ class Alarm {
                        .limit = limit_N,
                        .force_W_N = {force_W.x(), force_W.y(), force_W.z()}});
   }
-  // Whether a fault with the reaction `hold` was raised since the last call.
+  // Whether a fault with reaction `hold` was raised since the last call.
   [[nodiscard]] bool take_hold() noexcept {
     const bool raised = state_.hold_raised;
     state_.hold_raised = false;

@@ -1,5 +1,4 @@
-// Orders that a person may give to a running session, besides ending it. Commands enter the cycle from another thread
-// or from a script.
+// Orders from a person to a running session, except its end. They enter the cycle from another thread or a script.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +9,11 @@ namespace proxarm::controller {
 
 enum class Order : std::uint8_t {
   none,
-  hold,      // rendering: a controlled stop, drives stay enabled. Freeing: ends it
-  resume,    // from a hold: rendering goes on; the force is let in over ramp_in_s
+  hold,      // rendering: controlled stop, drives stay enabled. Freeing: ends it
+  resume,    // from a hold: continue rendering; the force rises over ramp_in_s
   release,   // from a hold: the arm follows the hand slowly, without the scene
   back_off,  // from a hold: the tool moves `value` metres along the last contact's normal
-  reset,     // after a fault: the drives are enabled again, into a hold
+  reset,     // after a fault: enable the drives again, into a hold
 };
 
 struct Command {
@@ -22,6 +21,6 @@ struct Command {
   double value = 0.0;
 };
 
-using ScheduledCommand = Scheduled<Command>;  // by the time since the first cycle
+using ScheduledCommand = Scheduled<Command>;  // times count from the first cycle
 
 }  // namespace proxarm::controller

@@ -12,9 +12,10 @@ namespace {
 
 constexpr double behind_share = 0.5;  // of following_error_rad
 constexpr double forgetting = 0.05;
-constexpr double passing_s = 0.05;  // half a period of 10 Hz: what waits for a joint that stands swings at 15 to 20 Hz
-constexpr int fewest_cycles = 5;    // in which a drive is away: one of them may be a frame that came late
-// Of the torque that accelerates a drive's rotor as it must be able to.
+constexpr double passing_s = 0.05;  // half a period of 10 Hz: setpoints that wait for a standing joint swing at 15 to
+                                    // 20 Hz
+constexpr int fewest_cycles = 5;    // with a drive away: a single one may be a late frame
+// Share of the torque with which a drive must be able to accelerate its rotor.
 constexpr double holding_share = 0.1;
 
 double counted(double time_s, bool is_so, double period_s) noexcept {
@@ -66,7 +67,7 @@ void DriveMonitor::follow(Eigen::Index i, const DriveReports& now, double period
   envelope_.step(i, now.setpoint_rad[i], period_s, lag_s(i, now, period_s));
 }
 
-// From the cycle on in which it begins to brake, the envelope stays where braking ends.
+// From the first cycle of braking on, the envelope stays at the end of braking.
 void DriveMonitor::brake(Eigen::Index i, const DriveReports& now, double period_s) noexcept {
   const auto bit = static_cast<std::uint8_t>(1u << i);
   if ((state_.braking & bit) != 0) return;
@@ -77,7 +78,7 @@ void DriveMonitor::brake(Eigen::Index i, const DriveReports& now, double period_
   envelope_.widen(i, down * down / (2.0 * a), up * up / (2.0 * a));
 }
 
-// A drive that takes no setpoints yet is to stand where it is.
+// A drive that takes no setpoints yet should stay where it is.
 void DriveMonitor::begin(Eigen::Index i, const DriveReports& now) noexcept {
   const auto bit = static_cast<std::uint8_t>(1u << i);
   const double from_rad = (now.following & bit) != 0 ? now.setpoint_rad[i] : now.reported_rad[i];
@@ -90,7 +91,7 @@ void DriveMonitor::begin(Eigen::Index i, const DriveReports& now) noexcept {
   state_.passing_s[i] = passing_s;
 }
 
-// `away` is at most the distance outside of the envelope; motion within it doesn't count.
+// `away` is at most the distance outside the envelope; motion within it doesn't count.
 void DriveMonitor::watch(Eigen::Index i, const DriveReports& now, bool waits, double period_s) noexcept {
   const double theta = now.reported_rad[i], d = envelope_.outside_rad(i, theta);
   const double moved = theta - std::exchange(state_.last_rad[i], theta), away = state_.away_rad[i] + moved;

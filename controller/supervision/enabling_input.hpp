@@ -1,20 +1,20 @@
-// The person's enabling switch (dead man's switch), as a bit that is received on a CAN bus: in a TPDO of a drive, or in
-// a message of its own.
+// The person's enabling switch (dead man's switch), received as a bit on a CAN bus: in a TPDO of a drive, or in a
+// separate message.
 //
-// The switch counts as released whenever its state isn't known: before the first message, if the last message is older
-// than the timeout, or if the message is too short to hold the bit. To start or go on, the person must press it anew:
+// The switch counts as released while its state is unknown: before the first message, if the last message is older than
+// the timeout, or if the message is too short to contain the bit. To start or continue, the person must press it anew:
 // one message must report it released and the next one pressed, with no gap beyond the timeout. A switch that is held,
 // tied down or stuck at "pressed" never starts anything.
 //
-// A switch with three positions has a second contact, which is made when it is squeezed through (IEC 60204-1, 10.9):
+// A three-position switch has a second contact, which closes when it is squeezed through (IEC 60204-1, 10.9):
 //
-//   contacts (middle, panic)   position    what was before         then
-//   0, 0                       released    anything                released
-//   1, 0                       middle      released                pressed, anew
-//   1, 0                       middle      pressed                 pressed
-//   1, 0                       middle      squeezed, or unknown    not pressed, until it was let go
-//   0, 1 and 1, 1              squeezed    anything                squeezed, not pressed
-//   none, or too old           unknown     anything                not pressed; squeezed stays so
+//   contacts (middle, panic)   position    before                 then
+//   0, 0                       released    any                    released
+//   1, 0                       middle      released               pressed, anew
+//   1, 0                       middle      pressed                pressed
+//   1, 0                       middle      squeezed, or unknown   not pressed until released
+//   0, 1 and 1, 1              squeezed    any                    squeezed, not pressed
+//   none, or too old           unknown     any                    not pressed; squeezed stays
 // So the way back from the third position through the middle one enables nothing.
 #pragma once
 
@@ -30,22 +30,22 @@ namespace proxarm::controller {
 
 class EnablingInput {
  public:
-  // `bus`: index in the network. Precondition: the cell has the drive that is named.
+  // `bus`: index in the network. Precondition: the cell has the drive named in `input`.
   EnablingInput(const description::EnablingInputDescription& input, const description::Cell& cell, std::size_t bus);
 
   [[nodiscard]] std::size_t bus() const noexcept { return bus_; }
-  // The identifier as in the lists of fieldbus::CanFilter: with extended_id_flag if it has 29 bits.
+  // Identifier as in the lists of fieldbus::CanFilter: with extended_id_flag if it has 29 bits.
   [[nodiscard]] std::uint32_t wanted_id() const noexcept;
 
-  // Returns true if the frame was the switch's message. Precondition: this and all below is called by the cycle's
-  // thread alone.
+  // Returns true if the frame is the switch's message. Precondition: only the cycle's thread calls this and all
+  // functions below.
   bool on_frame(std::size_t bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
   // Drops a message that has become too old. Precondition: called in each cycle before the others.
   void on_cycle(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool pressed() const noexcept { return pressed_; }
-  // The switch was squeezed through and hasn't been released since; always false with two positions.
+  // The switch was squeezed through and not released since; always false with two positions.
   [[nodiscard]] bool squeezed() const noexcept { return squeezed_; }
-  // Returns true once for each press after a release, while the switch is still pressed.
+  // Returns true once per press after a release, while the switch is still pressed.
   [[nodiscard]] bool take_press() noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -54,7 +54,7 @@ class EnablingInput {
 
  private:
   enum class Position : std::uint8_t { unknown, released, middle, squeezed };
-  // A bit in the message's data, and its value while the contact is made.
+  // A bit of the message's data, and its value when the contact is closed.
   struct Contact {
     std::size_t byte = 0;
     std::uint8_t mask = 0;
@@ -67,7 +67,7 @@ class EnablingInput {
   std::uint32_t id_;
   bool extended_;
   Contact middle_;
-  std::optional<Contact> panic_;  // the contact of the third position
+  std::optional<Contact> panic_;  // contact of the third position
   std::int64_t timeout_ns_;
   std::int64_t last_ns_ = 0;
   bool heard_ = false, pressed_ = false, released_before_ = false, pressed_anew_ = false;

@@ -17,8 +17,8 @@ constexpr const char* unconfirmed =
     "the arm was told to stop and to switch off, but not every drive has confirmed it: keep away until its power is "
     "off";
 
-// One row per fault: the reaction, what was seen, and what to do. The text of what was seen may contain %s for the
-// place and %.4g for value and limit. The texts of faults that only occur at a start say that nothing has moved.
+// One row per fault: reaction, cause and advice. The cause may contain %s for the place and %.4g for value and limit.
+// Texts of faults that occur only at a start say that nothing has moved.
 struct FaultText {
   Fault fault;
   const char* name;
@@ -178,7 +178,7 @@ const char* did(const FaultText& text, Reaction reaction) noexcept {
   return reaction == Reaction::stop_0 ? at_once : reaction == Reaction::hold ? held : stopped;
 }
 
-// The fault, where and when, and what was seen.
+// The fault with place and cycle, and its cause.
 std::string seen(const FaultReport& report, const std::string& where) {
   const FaultText& text = text_of(report.fault);
   std::string line = text.name;
@@ -193,16 +193,16 @@ std::string seen(const FaultReport& report, const std::string& where) {
   return line + " at cycle " + std::to_string(report.cycle);
 }
 
-constexpr double mostly = 0.9;  // of a direction: within 26 degrees of an axis, or of gravity
+constexpr double mostly = 0.9;  // share of a vector along a direction: within 26 degrees
 
-// To two digits, and to the whole number from 10 on.
+// Two digits; from 10 on a whole number.
 std::string two_digits(double number) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), number < 10.0 ? "%.2g" : "%.0f", number);
   return text.data();
 }
 
-// "+x", or the unit vector where none of the axes is near.
+// "+x", or the unit vector if no axis is near.
 std::string direction_text(const std::array<double, 3>& v) {
   const double length = std::hypot(v[0], v[1], v[2]);
   for (std::size_t i = 0; i < v.size(); ++i) {

@@ -1,11 +1,11 @@
-// Monitored standstill: while the arm is meant to stand (in a hold that has come to rest, and while the sensor is
-// tared), each joint must stay where its encoder reported it.
+// Monitored standstill: while the arm should stand (in a hold at rest, and during the tare), each joint must stay at
+// its position.
 //
 //   |θ(k) − θ(s)| > ε   is standstill_left,   ε = limits.following_error_rad,
-// s is the first cycle in which the arm has stood for 0.2 s, which is several times the lag of a drive. ε is the
-// deviation from its setpoint that the cell allows a drive at standstill. In the shipped scenes, drives that hold stay
-// within 0.024 mrad, even while a hand leans on the tool. At 0.8 m, 1 mrad is 0.8 mm. An encoder that isn't heard in a
-// cycle isn't judged in it, since feedback_late and drive_silent cover that.
+// s: the first cycle after the arm has stood for 0.2 s, several times a drive's lag. ε is the deviation from its
+// setpoint that the cell allows a drive at standstill; at 0.8 m, 1 mrad is 0.8 mm. In the shipped scenes, drives that
+// hold stay within 0.024 mrad, even while a hand leans on the tool. An encoder without an answer isn't judged in that
+// cycle: feedback_late and drive_silent cover it.
 #pragma once
 
 #include <cstdint>
@@ -30,8 +30,8 @@ class StandstillMonitor {
     state_.stood_rad.setZero(axes);
   }
 
-  // To be called in each cycle, with the angles by the motors' encoders, the bits of those that were heard, and whether
-  // the arm is meant to stand. Returns the first joint that moves.
+  // Call in each cycle with the motor encoders' angles, the bits of those that answered, and whether the arm should
+  // stand. Returns the first joint that moves.
   StandstillVerdict step(const models::JointVector& reported_rad, std::uint8_t fresh, bool stands,
                          double period_s) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
@@ -39,7 +39,7 @@ class StandstillMonitor {
  private:
   struct State {
     models::JointVector stood_rad;  // θ(s)
-    double stands_s = 0.0;          // how long the arm has been meant to stand
+    double stands_s = 0.0;          // time for which the arm should have stood
   };
 
   double tolerance_rad_;

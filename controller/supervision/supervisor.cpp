@@ -49,13 +49,13 @@ constexpr std::array events{"begin", "enabled", "reenabled", "tared",   "hold", 
                             "stop",  "fault",   "fault_off", "at_rest", "disabled", "wait",   "reset"};
 static_assert(phases.size() == phase_count && events.size() == event_count);
 
-// Whether a drive moves as nobody told it to.
+// Whether a drive moves without a command.
 bool is_astray(Fault fault) noexcept {
   return fault == Fault::drive_deviates || fault == Fault::position_implausible || fault == Fault::tool_too_fast ||
          fault == Fault::elbow_too_fast;
 }
 
-// Whether drives go into their own fault for it: theirs is no second one then, and their own ramps stop them.
+// Whether this fault makes drives report faults: these aren't a second fault, and the drives' own ramps stop them.
 bool makes_drives_faulty(Fault fault) noexcept {
   switch (fault) {
     case Fault::drive_silent:
@@ -99,7 +99,7 @@ bool Supervisor::handle(Event event) noexcept {
   return true;
 }
 
-// Precondition: called once per fault and cycle.
+// Precondition: called at most once per fault and cycle.
 void Supervisor::note(const FaultReport& report) noexcept {
   Notice& notice = notices_[static_cast<std::size_t>(report.fault)];
   if (notice.last == report.cycle + 1) return;
@@ -108,8 +108,8 @@ void Supervisor::note(const FaultReport& report) noexcept {
   notice.last = report.cycle + 1;
 }
 
-// While the arm stops, no drive may move as it likes: power is cut. A drive that only reports a fault while the others
-// still brake is no reason, unless something else had gone wrong before.
+// While the arm stops, no drive may move uncontrolled: power is cut. A drive that only reports a fault while the others
+// brake is no reason, unless another fault came before.
 bool Supervisor::escalates(Fault fault) const noexcept {
   if (fault == Fault::drive_fault) {
     const bool second = faulted() || phase_ == Phase::disabling;
@@ -157,8 +157,7 @@ void Supervisor::give_up_hold() noexcept {
 }
 
 void Supervisor::rescale(std::uint64_t cycle, double ratio) noexcept {
-  // Converts a cycle's number plus one (0: none). It rounds towards the present, so that nothing counts as over too
-  // early.
+  // Converts a cycle's number plus one (0: none). Rounds towards the present, so that nothing ends too early.
   const auto at = [&](std::uint64_t end) {
     if (end == 0 || end > cycle) return end;
     const double age = std::floor(ratio * static_cast<double>(cycle - end));

@@ -1,4 +1,4 @@
-// Which phase a session is in, and which events change it: one table, transitions(), which docs/supervision.md shows.
+// The phase of a session and the events that change it: one table, transitions(), shown in docs/supervision.md.
 //
 //   idle ─▶ enabling ─▶ taring ─▶ rendering ─▶ stopping ─▶ disabling ─▶ done
 //                                 ▲       │                    │
@@ -8,10 +8,10 @@
 //                            hold  │     ▼ free
 //                                  freeing
 //
-// A fault acts by its reaction (fault.hpp). A stop latches the fault: the first one is kept and reported, and only a
-// reset leads back, into a hold. A drive that goes astray while the arm stops, or has stopped and its drives aren't off
-// yet, makes a stop of category 0 of it: the first fault stays the report's, and the second is the escalation. Faults
-// with the reactions `continue`, `slow` and `hold` are counted.
+// A fault acts by its reaction (fault.hpp). A stop latches and reports the first fault; only a reset leaves this state,
+// into a hold. If a drive moves uncontrolled while the arm stops, or before its drives are off, the stop becomes one of
+// category 0: the first fault remains the reported one, the second is the escalation. Faults with the reactions
+// `continue`, `slow` and `hold` are counted.
 #pragma once
 
 #include <array>
@@ -24,14 +24,14 @@
 namespace proxarm::controller {
 
 enum class Phase : std::uint8_t {
-  idle,       // drives configured, nothing sent but SYNC and heartbeat; waits for the enabling input
-  enabling,   // the CiA 402 state machines are led to operation enabled; targets follow the actual positions
+  idle,       // drives configured, only SYNC and heartbeat sent; waits for the enabling input
+  enabling,   // drives go through CiA 402 to operation enabled; targets follow the actual positions
   taring,     // targets stand still; the sensor's bias is averaged
   rendering,  // the proxy moves, the arm follows
-  holding,    // all joints brake together along their last motion, and stand; drives stay enabled
-  freeing,    // from a hold: the arm follows the hand's force or backs off, slowly and without the scene
-  stopping,   // all joints brake together along their last motion, the slowest to stop at its own deceleration
-  disabling,  // targets stand still; the drives are led to switched off
+  holding,    // all joints brake together along their last motion, then stand; drives stay enabled
+  freeing,    // from a hold: the arm follows the hand or backs off, slowly and without the scene
+  stopping,   // all joints brake together along their last motion, in the time of the slowest
+  disabling,  // targets stand still; the drives are switched off
   faulted,    // drives off; waits for a reset
   done,
 };
@@ -40,17 +40,17 @@ inline constexpr std::size_t phase_count = static_cast<std::size_t>(Phase::done)
 enum class Event : std::uint8_t {
   begin,      // first cycle; with an enabling input: it was released and pressed
   enabled,    // all drives follow
-  reenabled,  // the same after a reset: the sensor is tared already, and a person may be pinned
+  reenabled,  // the same after a reset: no tare is needed, and a person may be pinned
   tared,      //
   hold,       // a fault with this reaction, or a command
-  resume,     // the cause is gone and the enabling input pressed, or a command
+  resume,     // the cause has ended and the enabling input is pressed, or a command
   free,       // a command: release, or back off
-  freed,      // the order hold, or backing off is over
-  stop,       // asked for: end of the duration, signal
+  freed,      // the order hold, or the end of backing off
+  stop,       // requested: end of the duration, signal
   fault,      // stop category 1
   fault_off,  // stop category 0
   at_rest,    //
-  disabled,   // all drives are off, or haven't confirmed it in time
+  disabled,   // all drives are off, or the time to confirm it is over
   wait,       // the same after a fault that may be reset
   reset,      // a command
 };
@@ -66,10 +66,10 @@ struct Transition {
 };
 [[nodiscard]] std::span<const Transition> transitions() noexcept;
 
-// How often a fault that didn't stop the arm has occurred.
+// Occurrences of a fault that didn't stop the arm.
 struct Notice {
-  std::uint32_t times = 0;   // number of occurrences, each after a cycle without the fault
-  std::uint64_t cycles = 0;  // number of cycles with the fault
+  std::uint32_t times = 0;   // occurrences, each after a cycle without the fault
+  std::uint64_t cycles = 0;  // cycles with the fault
   std::uint64_t last = 0;    // the last of these cycles plus one; 0: none
 };
 
@@ -85,39 +85,38 @@ class Supervisor {
   }
   [[nodiscard]] bool faulted() const noexcept { return report_.fault != Fault::none; }
   [[nodiscard]] const FaultReport& report() const noexcept { return report_; }  // the fault that stopped the arm
-  // The fault for which the stop that was under way became one of category 0; none: there wasn't one.
+  // The fault that turned the stop in progress into category 0, or none.
   [[nodiscard]] const FaultReport& escalation() const noexcept { return escalation_; }
-  // Whether the drives are to lose their power at once (stop category 0).
+  // Whether the drives lose power at once (stop category 0).
   [[nodiscard]] bool cuts_power() const noexcept {
     return escalation_.fault != Fault::none || (faulted() && report_.reaction == Reaction::stop_0);
   }
-  [[nodiscard]] const FaultReport& held_for() const noexcept { return held_for_; }  // none: it was asked for
+  [[nodiscard]] const FaultReport& held_for() const noexcept { return held_for_; }  // none: the hold was requested
   [[nodiscard]] Reaction reaction(Fault fault) const noexcept { return reactions_[static_cast<std::size_t>(fault)]; }
   [[nodiscard]] const Notice& notice(Fault fault) const noexcept { return notices_[static_cast<std::size_t>(fault)]; }
-  // Whether a fault that slows the arm down occurred in one of the last `cycles`.
+  // Whether a fault that slows the arm occurred in one of the last `cycles`.
   [[nodiscard]] bool slowed(std::uint64_t cycle, std::uint64_t cycles) const noexcept {
     return slow_end_ > 0 && cycle < slow_end_ + cycles;
   }
-  // Whether the fault that the arm was held for still lasts, or occurred in one of the last `cycles`.
+  // Whether the cause of the hold lasts, or occurred in one of the last `cycles`.
   [[nodiscard]] bool cause_lasts(std::uint64_t cycle, std::uint64_t cycles) const noexcept {
     return held_for_.fault != Fault::none && cycle < notice(held_for_.fault).last + cycles;
   }
 
-  // Changes the phase if transitions() has a row for this event, and ignores the event otherwise. Returns true if there
-  // was one.
+  // Changes the phase if transitions() has a row for this event; otherwise ignores the event. Returns whether there was
+  // one.
   bool handle(Event event) noexcept;
   // Applies the fault's reaction.
   void raise(FaultReport report) noexcept;
-  // A hold lasted too long: the arm stops, for the fault that it was held for.
+  // A hold lasted too long: the arm stops because of the hold's fault.
   void give_up_hold() noexcept;
-  // Begins a hold that a person asked for: held_for() is none.
+  // Begins a hold on request: held_for() is none.
   void hold() noexcept;
-  // Leaves the phase `faulted` and forgets the fault, so report() must be read before. Returns false in any other
-  // phase.
+  // Leaves the phase `faulted` and clears the fault, so read report() before. Returns false in any other phase.
   bool reset() noexcept;
 
-  // Changes to a timestep of which `ratio` times as many cycles last for the same time. Numbers of past cycles are
-  // converted so that their distances from this cycle last as long as before.
+  // Changes to a timestep with `ratio` times as many cycles per time. Converts past cycle numbers so that their
+  // distances in time from this cycle stay.
   void rescale(std::uint64_t cycle, double ratio) noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -137,7 +136,7 @@ class Supervisor {
   Reactions reactions_;
   Phase phase_ = Phase::idle;
   FaultReport report_, escalation_, held_for_;
-  std::uint64_t slow_end_ = 0;  // the last cycle with a fault that slows, plus one; 0: none
+  std::uint64_t slow_end_ = 0;  // last cycle with a slowing fault, plus one; 0: none
   std::array<Notice, fault_count> notices_{};
 };
 

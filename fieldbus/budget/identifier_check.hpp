@@ -1,7 +1,7 @@
-// Refuses a bus on which two devices would use one identifier: several of a cell's buses may share one interface.
+// Refuses a bus on which two devices would use the same identifier. Several of a cell's buses may share an interface.
 //
-// On CAN, two nodes that send one identifier destroy each other's frames, and a sensor's poll at a wrong place may be a
-// drive's setpoint or an NMT command. Checked before anything is sent.
+// Such frames destroy each other, and a sensor's poll with a wrong identifier may be a drive's setpoint or an NMT
+// command. So this is checked before anything is sent.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ struct UsedIdentifier {
   std::string owner;     // "drive of axis_1", "force sensor"
 };
 
-// Throws SetupError that names both owners and the identifier. `bus_names` by index, for the message.
+// Throws SetupError naming both owners and the identifier. `bus_names`: by index, for the message.
 void refuse_shared_identifiers(std::span<const UsedIdentifier> used, std::span<const std::string> bus_names);
 
 }  // namespace proxarm::fieldbus

@@ -8,24 +8,24 @@ namespace proxarm::fieldbus {
 namespace {
 
 constexpr std::int64_t no_bound = std::numeric_limits<std::int64_t>::max();
-constexpr int cycles_back = 2;  // a busy period that is looked at may have begun that many cycles before
+constexpr int cycles_back = 2;  // busy periods that began up to this many cycles earlier are examined
 
 std::int64_t floor_divide(std::int64_t a, std::int64_t b) noexcept {
   const std::int64_t quotient = a / b;
   return quotient * b > a ? quotient - 1 : quotient;
 }
 
-// One frame's view of its bus: which frames are in its busy period, and when they can be released.
+// One frame in the busy period of frame m, and when it can be released.
 struct Competitor {
   std::size_t frame = 0;
-  bool ahead = false;           // of the same sender: counts only if queued before
-  bool not_this_cycle = false;  // what m itself brings about, or what is queued behind it
-  bool held_back = false;       // can stand behind a weaker frame of its own sender
-  std::int64_t jitter_ns = 0;   // of its release, or of its getting to the head of its queue
+  bool ahead = false;           // from m's sender: counts only if queued before m
+  bool not_this_cycle = false;  // caused by m, or queued behind m: this cycle's instance doesn't delay m
+  bool held_back = false;       // can stand behind a lower-priority frame of its sender
+  std::int64_t jitter_ns = 0;   // of its release, or of reaching the head of its queue
 };
 
 struct Level {
-  std::uint64_t weakest = 0;  // priority that counts as "weaker" for the rest of the bus
+  std::uint64_t weakest = 0;  // lowest priority that can precede m; frames below it count as "lower priority"
   std::vector<Competitor> competitors;
 };
 
@@ -44,7 +44,7 @@ class Analysis {
   }
 
   std::vector<FrameWindow> run() {
-    // Start from an empty bus; frames can come after ones that are listed later, hence as many passes as frames.
+    // Start from an empty bus. A frame can come after one listed later, hence as many passes as frames.
     for (std::size_t pass = 0; pass < frames_.size(); ++pass) {
       for (std::size_t m = 0; m < frames_.size(); ++m) {
         windows_[m] = release_of(m);
@@ -62,7 +62,7 @@ class Analysis {
  private:
   [[nodiscard]] std::size_t trigger(std::size_t m) const { return static_cast<std::size_t>(triggers_[m]); }
 
-  // What comes after a frame that is out of step is out of step, too, and as rare.
+  // A frame that comes after one out of step is out of step, too, and isn't sent more often.
   void inherit_phase() {
     for (std::size_t pass = 0; pass < frames_.size(); ++pass) {
       for (std::size_t m = 0; m < frames_.size(); ++m) {
@@ -74,7 +74,7 @@ class Analysis {
     }
   }
 
-  // Its place in the cycle is known, though it may not come in each.
+  // True if the frame's time in the cycle is known; it may not be sent in every cycle.
   [[nodiscard]] bool in_step(std::size_t k) const { return !frames_[k].any_time; }
   [[nodiscard]] std::int64_t every_ns(std::size_t k) const {
     return frames_[k].every_ns > 0 ? frames_[k].every_ns : period_ns_ * frames_[k].every_cycles;
@@ -97,7 +97,7 @@ class Analysis {
     return window;
   }
 
-  // Windows only ever grow, and stop beyond a limit, so this ends. True if it grew.
+  // Windows only grow, and stop at a limit, so the iteration ends. True if this one grew.
   bool update(std::size_t m) {
     const FrameWindow old = windows_[m];
     if (!old.bounded) return false;
@@ -116,7 +116,7 @@ class Analysis {
            now.bounded != old.bounded;
   }
 
-  // Whether frame k of some cycle is what makes m be queued in the same cycle, by way of others or not.
+  // True if frame k, directly or through others, causes m to be queued in the same cycle.
   [[nodiscard]] bool leads_to(std::size_t k, std::size_t m) const {
     for (int at = triggers_[m]; at >= 0; at = triggers_[static_cast<std::size_t>(at)]) {
       if (at == static_cast<int>(k)) return true;
@@ -124,14 +124,14 @@ class Analysis {
     return false;
   }
 
-  // Queued by the same sender at one moment: the order of the list decides.
+  // True if one sender queues both at the same time, so that the order of the list decides.
   [[nodiscard]] bool queued_together(std::size_t a, std::size_t b) const {
     return frames_[a].sender == frames_[b].sender && triggers_[a] == triggers_[b] && in_step(a) && in_step(b) &&
            frames_[a].release == frames_[b].release && frames_[a].delay_ns == frames_[b].delay_ns &&
            frames_[a].latest_delay_ns == frames_[b].latest_delay_ns;
   }
 
-  // Whether frame k can be pending at some time in [from, to]; out of step, it always can.
+  // True if frame k can be pending at some time in [from, to]; always for a frame out of step.
   [[nodiscard]] bool can_be_pending(std::size_t k, std::int64_t from_ns, std::int64_t to_ns) const {
     if (!in_step(k)) return true;
     const FrameWindow& window = windows_[k];
@@ -139,7 +139,7 @@ class Analysis {
     return window.finish_ns + last * period_ns_ > from_ns;
   }
 
-  // Whether frame a of the same sender can stand before m in its queue.
+  // True if frame a of the same sender can precede m in its queue.
   [[nodiscard]] bool can_precede(std::size_t a, std::size_t m) const {
     if (a == m || frames_[a].sender != frames_[m].sender) return false;
     if (!in_step(a) || !in_step(m)) return true;
@@ -155,8 +155,8 @@ class Analysis {
     }
     for (std::size_t k = 0; k < frames_.size(); ++k) {
       const bool same_sender = frames_[k].sender == frames_[m].sender;
-      // (What can precede m is no weaker than the weakest.) One of the same sender that is gone before m is queued can
-      // still have made others wait, and so is in the busy period.
+      // (No frame that can precede m has a priority below the weakest.) A frame of m's sender that ended before m was
+      // queued still belongs to the busy period, as it may have delayed others.
       if (k == m || priority_[k] > level.weakest) continue;
       Competitor competitor{k, same_sender, leads_to(m, k) || (queued_together(k, m) && k > m), false, 0};
       for (std::size_t l = 0; l < frames_.size(); ++l) {
@@ -169,12 +169,12 @@ class Analysis {
       }
       level.competitors.push_back(competitor);
     }
-    // Its own instances of earlier cycles.
+    // m's instances of earlier cycles.
     level.competitors.push_back({m, true, true, false, windows_[m].jitter_ns});
     return level;
   }
 
-  // How many instances of the competitor can be released in [start, end]. phase_known: start is a time in m's cycle.
+  // Most instances of the competitor that can be released in [start, end]. phase_known: start is a time in m's cycle.
   [[nodiscard]] std::int64_t releases(const Competitor& k, std::int64_t start_ns, std::int64_t end_ns,
                                       bool phase_known) const {
     if (end_ns < start_ns) return 0;
@@ -186,7 +186,7 @@ class Analysis {
     return std::clamp<std::int64_t>(last - before, 0, at_any_phase);
   }
 
-  // Start of m's transmission at worst, in a busy period that begins at start_ns; or no_bound.
+  // Worst-case start of m's transmission in a busy period that begins at start_ns, or no_bound.
   [[nodiscard]] std::int64_t begin_of(std::size_t m, const Level& level, std::int64_t start_ns,
                                       std::int64_t blocking_ns, std::int64_t latest_release_ns,
                                       bool phase_known) const {
@@ -194,7 +194,7 @@ class Analysis {
     for (;;) {
       std::int64_t next_ns = start_ns + blocking_ns;
       for (const Competitor& k : level.competitors) {
-        if (k.frame == m && !phase_known) continue;  // its response is at most its own distance, or there is no bound
+        if (k.frame == m && !phase_known) continue;  // m responds within its repetition time, else there is no bound
         const std::int64_t end_ns = k.ahead ? std::min(begin_ns, latest_release_ns) : begin_ns;
         next_ns += worst_ns_[k.frame] * releases(k, start_ns, end_ns, phase_known);
       }
@@ -204,7 +204,7 @@ class Analysis {
     }
   }
 
-  // The longest weaker frame that can be on the wire at some time in [from, to].
+  // The longest lower-priority frame that can be on the wire at some time in [from, to].
   [[nodiscard]] std::int64_t blocking(std::size_t m, const Level& level, std::int64_t from_ns, std::int64_t to_ns,
                                       bool anything) const {
     std::int64_t longest_ns = 0;
@@ -239,8 +239,8 @@ class Analysis {
     }
   }
 
-  // All busy periods in which m can be: each begins with the release of one of its frames. While it begins later, but
-  // with the same frames in it, it also ends later; so the last moments at which a frame can still be in it are enough.
+  // Examines all busy periods that can contain m. Each begins with the release of one of its frames. If it begins later
+  // with the same frames, it also ends later. So it is enough to try the last times at which a frame can be in it.
   void examine_in_step(std::size_t m, const Level& level) {
     const FrameWindow own = windows_[m];
     const std::int64_t latest_ns = own.release_ns + own.jitter_ns;
@@ -253,7 +253,7 @@ class Analysis {
     examine_start(m, level, {m, false, false, false, own.jitter_ns}, 0, lasts);
     for (const Competitor& k : level.competitors) {
       if (!in_step(k.frame)) {
-        // It can begin one at any moment up to m's release.
+        // It can begin a busy period at any time up to m's release.
         for (const std::int64_t start_ns : lasts) examine_start_at(m, level, start_ns, blocking(m, level, 0, 0, true));
         continue;
       }
@@ -261,7 +261,7 @@ class Analysis {
     }
   }
 
-  // Of the competitor's instances, the last that can be released up to a time in m's cycle.
+  // Last cycle whose instance of the competitor can be released by a time in m's cycle.
   [[nodiscard]] std::int64_t last_cycle(const Competitor& k, std::int64_t time_ns) const {
     const std::int64_t last = floor_divide(time_ns - windows_[k.frame].release_ns, period_ns_);
     return k.not_this_cycle ? std::min<std::int64_t>(last, -1) : last;
@@ -273,7 +273,7 @@ class Analysis {
     const std::int64_t from_ns = windows_[first.frame].release_ns + n * period_ns_;
     const std::int64_t to_ns = from_ns + first.jitter_ns;
     const PlannedFrame& frame = frames_[first.frame];
-    // Queued at the very end of another frame, it takes part in the next arbitration: nothing is on the wire.
+    // A frame queued at the very end of another takes part in the next arbitration, so no other frame blocks it.
     const bool at_end = triggers_[first.frame] >= 0 && frame.delay_ns == 0 && frame.latest_delay_ns <= 0;
     std::int64_t blocking_ns = 0;
     if (first.held_back) {
@@ -292,7 +292,7 @@ class Analysis {
     const std::int64_t latest_ns = window.release_ns + window.jitter_ns;
     if (start_ns > latest_ns) return;
     const std::int64_t begin_ns = begin_of(m, level, start_ns, blocking_ns, latest_ns, true);
-    if (begin_ns < window.release_ns) return;  // over before m is released
+    if (begin_ns < window.release_ns) return;  // the busy period ends before m is released
     grow(m, begin_ns, std::max(start_ns, window.release_ns));
   }
 

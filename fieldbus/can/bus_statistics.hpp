@@ -1,5 +1,5 @@
-// What a simulated bus carried: time in use, load, and the worst response of each identifier, to hold against the
-// predictions of bus_budget.hpp.
+// Load of a simulated bus and worst response time of each identifier, to be compared with the predictions of
+// bus_budget.hpp.
 #pragma once
 
 #include <array>
@@ -15,18 +15,18 @@ struct IdentifierStatistics {
   std::uint32_t id = 0;
   bool extended = false;
   std::uint64_t frames = 0;
-  int least_bits = 0;  // on the wire, both bitrates together, interframe space included
+  int least_bits = 0;  // bits at both bitrates together, interframe space included
   int most_bits = 0;
-  std::int64_t worst_response_ns = 0;  // from the call of send() to the end of the frame (before the interframe space)
+  std::int64_t worst_response_ns = 0;  // from the call of send() to the end of the frame, without the interframe space
 };
 
 class BusStatistics {
  public:
   explicit BusStatistics(std::int64_t window_ns);
 
-  // Forgets all and counts from now on.
+  // Clears all counts and starts again at now_ns.
   void reset(std::int64_t now_ns) noexcept;
-  // A frame occupies the bus in [start_ns, idle_ns). Frames come in order. Allocates only for an identifier never seen.
+  // A frame occupies the bus in [start_ns, idle_ns). Frames come in order. Allocates only for a new identifier.
   void add_frame(const CanFrame& frame, WireBits bits, std::int64_t start_ns, std::int64_t idle_ns);
   void add_response(const CanFrame& frame, std::int64_t response_ns) noexcept;
   void add_collision() noexcept { ++collisions_; }
@@ -36,11 +36,12 @@ class BusStatistics {
   [[nodiscard]] std::int64_t busy_ns(std::int64_t now_ns) const noexcept;
   // Fraction of the time since reset() in which the bus was in use, 0..1.
   [[nodiscard]] double load(std::int64_t now_ns) const noexcept;
-  // The largest load of any complete window of window_ns since reset(), windows side by side.
+  // Largest load of any complete window of window_ns since reset(). Windows don't overlap.
   [[nodiscard]] double peak_load() const noexcept;
-  // Two nodes began the same identifier at the same moment: on a real bus an error. The first attached one was let go.
+  // How often two nodes began the same identifier at the same moment, an error on a real bus. The frame of the node
+  // attached first was sent.
   [[nodiscard]] std::uint64_t collisions() const noexcept { return collisions_; }
-  // In the order of first appearance.
+  // In order of first appearance.
   [[nodiscard]] const std::vector<IdentifierStatistics>& identifiers() const noexcept { return identifiers_; }
   // nullptr if never seen.
   [[nodiscard]] const IdentifierStatistics* find(std::uint32_t id, bool extended = false) const noexcept;
@@ -51,7 +52,7 @@ class BusStatistics {
 
   std::int64_t window_ns_;
   std::int64_t since_ns_ = 0;
-  std::int64_t busy_ns_ = 0;  // including the rest of a frame still running
+  std::int64_t busy_ns_ = 0;  // including the rest of a frame in progress
   std::int64_t busy_until_ns_ = 0;
   std::int64_t window_end_ns_ = 0;
   std::int64_t window_busy_ns_ = 0;
@@ -60,7 +61,7 @@ class BusStatistics {
   std::uint64_t bits_ = 0;
   std::uint64_t collisions_ = 0;
   std::vector<IdentifierStatistics> identifiers_;
-  std::array<std::uint16_t, 2048> index_of_base_id_{};  // place in identifiers_ plus 1; 0: not seen
+  std::array<std::uint16_t, 2048> index_of_base_id_{};  // index in identifiers_ plus 1; 0: not seen
 };
 
 }  // namespace proxarm::fieldbus

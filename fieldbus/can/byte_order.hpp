@@ -1,6 +1,6 @@
-// Numbers out of and into the bytes of a frame, whatever the machine's own byte order.
+// Reads and writes numbers in the bytes of a frame, independent of the machine's byte order.
 //
-// The caller has checked that `bytes` is long enough; nothing else is assumed.
+// Precondition: `bytes` is long enough.
 #pragma once
 
 #include <bit>

@@ -1,4 +1,4 @@
-// The one shape of a CAN frame inside proxarm: classic or FD, 11- or 29-bit identifier.
+// A CAN frame: classic or FD, 11- or 29-bit identifier.
 #pragma once
 
 #include <array>
@@ -7,14 +7,14 @@
 
 namespace proxarm::fieldbus {
 
-// One CAN or CAN FD data frame. `length` counts data bytes: 0..8 classic; FD 0..8, 12, 16, 20, 24, 32, 48, 64.
-// Bytes past `length` are zero and mean nothing.
+// One CAN or CAN FD data frame. `length` counts data bytes: 0..8 classic; FD 0..8, 12, 16, 20, 24, 32, 48, 64. Bytes
+// past `length` are zero and have no meaning.
 struct CanFrame {
-  std::uint32_t id = 0;          // 11 or 29 bits, no flag bits in it
-  bool extended = false;         // 29-bit identifier
-  bool remote = false;           // remote request (classic only); carries no data
-  bool error = false;            // not a frame on the wire: the interface reports a bus error (SocketCAN error frame)
-  bool fd = false;               // CAN FD frame format
+  std::uint32_t id = 0;   // 11 or 29 bits, without flag bits
+  bool extended = false;  // 29-bit identifier
+  bool remote = false;    // remote request (classic only), without data
+  bool error = false;     // reported bus error (SocketCAN error frame); no frame was on the wire
+  bool fd = false;
   bool bit_rate_switch = false;  // FD: data phase at the higher bitrate
   std::uint8_t length = 0;
   std::array<std::uint8_t, 64> data{};
@@ -23,7 +23,7 @@ struct CanFrame {
   friend bool operator==(const CanFrame&, const CanFrame&) = default;
 };
 
-// A frame and the moment at which its last bit was on the wire, in nanoseconds of the network's clock.
+// A frame and the time at which its last bit was on the wire, in ns of the network's clock.
 struct TimedFrame {
   CanFrame frame;
   std::int64_t time_ns = 0;

@@ -1,7 +1,6 @@
-// How a node at the far end of the wire (a simulated drive or sensor) meets its bus.
-//
-// The same node runs on an in-process bus (SimulatedCanNetwork) or, in a process of its own, on an interface of the
-// kernel: whoever owns the bus hands it a CanPort to send on and calls on_frame() for every frame of the others.
+// Connects a simulated drive or sensor to its bus, an in-process bus (SimulatedCanNetwork) or, in a separate process, a
+// CAN interface of the kernel. The owner of the bus gives the device a CanPort for sending and calls on_frame() for
+// every frame of another node.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +17,7 @@ class CanPort {
   CanPort& operator=(const CanPort&) = delete;
   virtual ~CanPort() = default;
 
-  // Queues the frame behind those that this node sent before. Never blocks.
+  // Queues the frame behind this node's earlier ones. Never blocks.
   virtual SendResult send(const CanFrame& frame) noexcept = 0;
 };
 
@@ -29,7 +28,7 @@ class CanListener {
   CanListener& operator=(const CanListener&) = delete;
   virtual ~CanListener() = default;
 
-  // A frame of another node, complete on the wire at time_ns. May send and schedule events; own frames don't come back.
+  // Reports a frame of another node, complete on the wire at time_ns. May send and schedule events.
   virtual void on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept = 0;
 };
 

@@ -85,7 +85,7 @@ NamedInterface decode_link(nlmsghdr* header) {
   return out;
 }
 
-// Asks the kernel and calls on_link for each answer. False where netlink itself fails.
+// Asks the kernel and calls on_link for each answer. False if netlink itself fails.
 template <class F>
 bool query_links(const std::string* name, F&& on_link) {
   const int fd = ::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE);

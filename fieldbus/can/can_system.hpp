@@ -1,6 +1,5 @@
-// The operating system as SocketCanNetwork meets it: one virtual function per system call, so that tests can answer
-// ENOBUFS, EAFNOSUPPORT or a lost interface where no such kernel is at hand. Semantics, results and errno are the
-// calls'.
+// The system calls of SocketCanNetwork, one virtual function each. Tests override them to return ENOBUFS, EAFNOSUPPORT
+// or a lost interface. Semantics, results and errno are those of the calls.
 #pragma once
 
 #include <poll.h>
@@ -15,7 +14,7 @@ namespace proxarm::fieldbus {
 
 class CanSystem {
  public:
-  // What the kernel says of an interface; `kind` is the driver's link kind ("vcan", "can"), empty where it has none.
+  // `kind` is the driver's link kind ("vcan", "can"), empty if it has none.
   struct Interface {
     bool exists = false;
     unsigned index = 0;
@@ -29,7 +28,7 @@ class CanSystem {
   CanSystem(const CanSystem&) = delete;
   CanSystem& operator=(const CanSystem&) = delete;
   virtual ~CanSystem() = default;
-  // The real one; stateless.
+  // The real system calls; stateless.
   static CanSystem& real() noexcept;
 
   [[nodiscard]] virtual Interface interface(const std::string& name);  // by rtnetlink; works without CAN in the kernel

@@ -5,8 +5,8 @@
 namespace proxarm::fieldbus {
 namespace {
 
-// Stuffing as a machine of eight states: the value of the last bit on the wire (bit 2) and how many equal ones there
-// are, less one (bits 0, 1). The fifth equal bit brings its stuff bit with it, so a run of five is never left standing.
+// Bit stuffing as a machine of eight states: the value of the last bit on the wire (bit 2), and the length of its run
+// of equal bits, less one (bits 0, 1). The step that adds a fifth equal bit also adds its stuff bit.
 struct StuffStep {
   int state;
   int stuff_bits;
@@ -98,7 +98,7 @@ WireBits classic_bits(const CanFrame& frame) noexcept {
     crc = ((crc << 8) ^ crc15_table[((crc >> 7) ^ byte) & 0xff]) & 0x7fff;
     stuff.byte(byte);
   }
-  // 15 bits and one more that differs from the last, so that it can't complete a run of five.
+  // The 15 CRC bits and one more that differs from the last, so that it can't complete a run of five.
   const unsigned tail = (crc << 1) | (~crc & 1);
   stuff.byte(tail >> 8);
   stuff.byte(tail & 0xff);
@@ -131,7 +131,7 @@ WireBits fd_bits(const CanFrame& frame) noexcept {
     for (int i = 0; i < bytes; ++i) stuff.byte(frame.data[static_cast<std::size_t>(i)]);
     last_bit = frame.data[static_cast<std::size_t>(bytes - 1)] & 1;
   }
-  // A stuff bit after the very last bit is the first fixed stuff bit, which is counted in the 27 or 32.
+  // A stuff bit due after the last bit is the first fixed stuff bit, which the 27 or 32 already include.
   const int rest_stuff = stuff.count() - head_stuff - (stuff.last_bit_on_wire() != last_bit ? 1 : 0);
   const WireBits bits{(frame.extended ? 36 : 17) + head_stuff + 13,
                       5 + 8 * bytes + rest_stuff + (bytes <= 16 ? 27 : 32)};

@@ -1,4 +1,4 @@
-// How long a CAN frame occupies its bus: exactly, from its own bits, and the published bounds for planning.
+// How long a CAN frame occupies its bus: the exact time from its bits, and published bounds for planning.
 //
 // Classic frame, n data bytes (ISO 11898-1; one column per bit count):
 //   11-bit: SOF 1, id 11, RTR 1, IDE 1, r0 1, DLC 4, data 8n, CRC 15                                       = 34 + 8n
@@ -8,10 +8,11 @@
 // CAN FD:
 //   11-bit: SOF 1, id 11, RRS 1, IDE 1, FDF 1, res 1, BRS 1                                                = 17
 //   29-bit: SOF 1, id 11, SRR 1, IDE 1, id 18, RRS 1, FDF 1, res 1, BRS 1                                  = 36
-//   ESI 1, DLC 4, data 8n (stuffed up to here); stuff count 4, CRC 17 (n ≤ 16) or 21; a fixed stuff bit before the
-//   stuff count and after each four bits of what follows: 27 or 32 bits in all. A dynamic stuff bit due after the last
-//   data bit coincides with the first fixed one. ESI is taken as 0 (sender error active). the same 13 bits at the end.
-//   With BRS, what follows the first line runs at the data bitrate, except those 13.
+//   ESI 1, DLC 4, data 8n (stuffed as above up to here)
+//   stuff count 4, CRC 17 (n ≤ 16) or 21, with a fixed stuff bit before the stuff count and after each four of these
+//   bits: 27 or 32 in all; then the same 13 bits as above
+//   A dynamic stuff bit due after the last data bit coincides with the first fixed one. ESI is assumed 0 (sender error
+//   active). With BRS, all but the first line and the last 13 bits are sent at the data bitrate.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +28,7 @@ struct BitRates {
   std::int64_t data = 0;             // bit/s of the CAN FD data phase; 0: all at the nominal rate
 };
 
-// Bits on the wire, interframe space included, by the bitrate they are sent at.
+// Bits on the wire, interframe space included, by bitrate.
 struct WireBits {
   int nominal = 0;
   int data = 0;  // 0 unless FD with bit rate switch
@@ -36,7 +37,7 @@ struct WireBits {
   friend constexpr bool operator==(const WireBits&, const WireBits&) = default;
 };
 
-// Exact bits of this frame. Lengths that don't exist are rounded up to the next that does. No allocation; any thread.
+// Exact bits of this frame. Invalid lengths are rounded up to the next valid one. No allocation; any thread.
 [[nodiscard]] WireBits wire_bits(const CanFrame& frame) noexcept;
 
 // Duration in ns, rounded to the nearest.
@@ -50,7 +51,7 @@ struct WireBits {
   return wire_time_ns(wire_bits(frame), rates);
 }
 
-// What is known of a frame before its identifier and data are.
+// Properties of a frame that are known in planning.
 struct FrameShape {
   int bytes = 0;
   bool extended = false;
@@ -59,7 +60,7 @@ struct FrameShape {
   friend constexpr bool operator==(const FrameShape&, const FrameShape&) = default;
 };
 
-// Data length that the DLC can say: itself up to 8 (classic: at most 8), then 12, 16, 20, 24, 32, 48, 64.
+// Next length with a DLC: up to 8 itself (classic: at most 8), then 12, 16, 20, 24, 32, 48, 64.
 [[nodiscard]] constexpr int padded_length(int bytes, bool fd) noexcept {
   if (bytes <= 0) return 0;
   if (bytes <= 8) return bytes;
@@ -69,7 +70,7 @@ struct FrameShape {
   }
   return 64;
 }
-// True if a frame of this kind can carry exactly this many bytes.
+// True if a frame of this kind can carry this many bytes.
 [[nodiscard]] constexpr bool is_valid_length(int bytes, bool fd) noexcept {
   return bytes >= 0 && padded_length(bytes, fd) == bytes;
 }

@@ -17,9 +17,9 @@ using description::in_quotes;
 using description::SetupError;
 
 constexpr std::string_view digits = "0123456789ABCDEF";
-constexpr std::uint32_t error_flag = 0x20000000;  // in the identifier of an error frame, as SocketCAN has it
+constexpr std::uint32_t error_flag = 0x20000000;  // in the identifier of an error frame, as in SocketCAN
 constexpr unsigned switch_flag = 1;               // CANFD_BRS
-constexpr std::size_t longest_line = 4096;        // a line beyond is no candump line, whatever it holds
+constexpr std::size_t longest_line = 4096;        // a longer line is rejected unread
 
 class Output {
  public:
@@ -69,7 +69,7 @@ int hex_value(char c) noexcept {
 
 bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\r'; }
 
-// Takes the next word off the text.
+// Removes the next word from the text and returns it.
 std::string_view take_word(std::string_view& text) noexcept {
   while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
   std::size_t length = 0;
@@ -137,7 +137,7 @@ std::optional<Mistake> parse_data(std::string_view text, CanFrame& out) noexcept
     out.data[bytes++] = static_cast<std::uint8_t>(high << 4 | low);
     rest.remove_prefix(2);
   }
-  if (!rest.empty()) {  // a DLC above 8: eight bytes all the same
+  if (!rest.empty()) {  // a DLC above 8 still means eight bytes
     if (out.fd || bytes != 8 || rest.size() != 2 || hex_value(rest[1]) < 9) {
       return Mistake{text, "_9 to _F after eight bytes only"};
     }

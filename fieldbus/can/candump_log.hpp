@@ -1,15 +1,15 @@
-// Frames as text in the format of can-utils (`candump -L`), so that canplayer, python-can and others read our records
-// and we read theirs. One frame a line:
+// Reads and writes frames as text in the format of can-utils (`candump -L`), as canplayer, python-can and other tools
+// do. One frame per line:
 //
 //   (1436509052.249713) vcan0 044#2A366C2BBA          11-bit identifier: 3 hex digits, then the data
 //   (1436509052.449847) vcan0 1FFFFFFF#               29-bit: 8 hex digits
-//   (1436509052.649713) vcan0 123#R4                  remote, with its length where that isn't 0
+//   (1436509052.649713) vcan0 123#R4                  remote, with its length if that isn't 0
 //   (1436509052.849713) vcan0 213##1112233445566778   CAN FD: one digit of flags (1 bit rate switch, 2 error state)
 //   (1436509052.949713) vcan0 20000040#0000000000000000   error frame: bit 29 of the identifier set
 //
-// The reader also takes nanoseconds (nine digits), lower case, dots between bytes, a raw DLC ("_9" .. "_F" after eight
-// bytes), the direction that candump -x appends (R or T), and blank lines and lines that start with '#' as comments.
-// Anything else is a SetupError that names the line.
+// The reader also accepts nanoseconds (nine digits), lower case, dots between bytes, a raw DLC ("_9" .. "_F" after
+// eight bytes), the direction that candump -x appends (R or T), blank lines, and comments (lines starting with '#').
+// Other lines are SetupErrors with the line's number.
 #pragma once
 
 #include <array>
@@ -30,25 +30,24 @@ namespace proxarm::fieldbus {
 inline constexpr std::size_t max_candump_line = 192;
 using CandumpLine = std::array<char, max_candump_line>;
 
-// Writes one line, newline included, and returns its length. The name is cut at 15 characters, as interfaces' names
-// are, and blanks in it become '_'; an empty one becomes "can". Times before 0 become 0. No allocation; any thread.
+// Writes one line with its newline and returns its length. The name is cut at 15 characters, the limit for interfaces,
+// and its blanks become '_'; an empty name becomes "can". Times before 0 become 0. No allocation; any thread.
 std::size_t format_candump_line(CandumpLine& out, std::int64_t time_ns, std::string_view interface,
                                 const CanFrame& frame) noexcept;
 
 struct CandumpEntry {
-  std::int64_t time_ns = 0;  // since the epoch, or whatever zero the log has
+  std::int64_t time_ns = 0;  // since the epoch, or since the log's zero
   std::string interface;
   CanFrame frame;
 };
 
-// Writes a log file through a buffer of its own. Not for the cycle's thread: the buffer is flushed to the file.
+// Writes a log file. Not for the cycle's thread: flushing the buffer can block.
 class CandumpLogWriter {
  public:
-  // epoch_ns is added to every time: 0 for virtual time. Throws SetupError if the file can't be made.
+  // epoch_ns is added to every time: 0 for virtual time. Throws SetupError if the file can't be created.
   explicit CandumpLogWriter(const std::string& path, std::int64_t epoch_ns = 0);
   void write(std::int64_t time_ns, std::string_view interface, const CanFrame& frame) noexcept;
-  // Flushes and closes; throws SetupError if anything couldn't be written. A log that is destroyed without it is
-  // closed, too, but silently.
+  // Flushes and closes the file; throws SetupError if anything couldn't be written. The destructor closes it silently.
   void finish();
 
  private:
@@ -63,9 +62,9 @@ class CandumpLogWriter {
 
 class CandumpLogReader {
  public:
-  // `name` is for messages. The stream outlives the reader.
+  // `name` is for messages. The stream must outlive the reader.
   CandumpLogReader(std::istream& stream, std::string name);
-  // The next frame; false at the end. Throws SetupError for a line that is none.
+  // Reads the next frame; false at the end. Throws SetupError for an invalid line.
   bool next(CandumpEntry& out);
   [[nodiscard]] int line() const noexcept { return line_; }
 
@@ -76,7 +75,7 @@ class CandumpLogReader {
   int line_ = 0;
 };
 
-// All of a file. Throws SetupError if it can't be read.
+// Reads all frames of a file. Throws SetupError if it can't be read.
 [[nodiscard]] std::vector<CandumpEntry> read_candump_log(const std::string& path);
 
 }  // namespace proxarm::fieldbus

@@ -1,5 +1,4 @@
-// A first-in first-out queue of fixed capacity, for frames that wait on either side of a bus.
-// All memory is taken at construction. For one thread.
+// A first-in first-out queue of fixed capacity, for frames. All memory is allocated at construction. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +11,7 @@ class RingBuffer {
  public:
   explicit RingBuffer(std::size_t capacity) : items_(capacity) {}
 
-  // False when full: nothing was stored.
+  // False if full; then nothing is stored.
   bool push(const T& item) noexcept {
     if (size_ == items_.size()) return false;
     std::size_t index = head_ + size_;
@@ -21,7 +20,7 @@ class RingBuffer {
     ++size_;
     return true;
   }
-  // Oldest element; there must be one.
+  // Oldest element. Precondition: not empty.
   [[nodiscard]] const T& front() const noexcept { return items_[head_]; }
   void pop() noexcept {
     if (++head_ == items_.size()) head_ = 0;

@@ -19,7 +19,7 @@ namespace {
 
 using description::SetupError;
 
-// CLOCK_REALTIME is slewed by 500 ppm at most: 5 µs in this time.
+// CLOCK_REALTIME is slewed by at most 500 ppm, which is 5 µs in this time.
 constexpr std::int64_t difference_kept_ns = 10'000'000;
 constexpr std::size_t batch_size = 32;  // frames per recvmmsg or sendmmsg
 
@@ -75,7 +75,7 @@ SendResult send_result(int error) noexcept {
   }
 }
 
-// Returns how many bytes of `out` are for the kernel.
+// Returns the number of bytes of `out` to be passed to the kernel.
 std::size_t encode(const CanFrame& frame, canfd_frame& out) noexcept {
   out.can_id = frame.id | (frame.extended ? CAN_EFF_FLAG : 0u) | (frame.remote ? CAN_RTR_FLAG : 0u);
   out.len = frame.length;
@@ -103,21 +103,21 @@ CanFrame decode(const canfd_frame& raw, bool fd) noexcept {
 
 }  // namespace
 
-// Takes the kernel's stamps over to CLOCK_MONOTONIC. A clock is a system call where the kernel has no vDSO: so one
-// reading for all buses, and the difference of the clocks is kept for a while.
+// Converts the kernel's stamps to CLOCK_MONOTONIC. Without vDSO, reading a clock is a system call. So all buses share
+// one reading, and the difference of the clocks is kept for a while.
 class SocketCanNetwork::Clocks {
  public:
   explicit Clocks(CanSystem& system) : system_(system) {}
 
-  // Right after a batch.
+  // Call right after receiving a batch.
   void read() noexcept {
     now_ns_ = system_.clock_ns(CLOCK_MONOTONIC);
     if (now_ns_ < read_again_ns_) return;
     offset_ns_ = now_ns_ - system_.clock_ns(CLOCK_REALTIME);
     read_again_ns_ = now_ns_ + difference_kept_ns;
   }
-  [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }  // of the last reading
-  // 0: no stamp.
+  [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }  // at the last reading
+  // stamp_ns = 0: no stamp.
   [[nodiscard]] std::int64_t monotonic_ns(std::int64_t stamp_ns) const noexcept {
     return stamp_ns > 0 ? std::min(stamp_ns + offset_ns_, now_ns_) : now_ns_;
   }
@@ -146,10 +146,10 @@ class SocketCanNetwork::Bus final : public CanBus {
   [[nodiscard]] int fd() const noexcept { return fd_; }
   [[nodiscard]] bool fd_capable() const noexcept { return fd_capable_; }
   [[nodiscard]] bool has_frame() const noexcept { return next_ < count_; }
-  // The kernel has just said that nothing is there.
+  // The kernel has just reported that nothing is waiting.
   void known_empty() noexcept { drained_ = !has_frame(); }
-  // Reads a batch if none is left; their times are the kernel's until date() has been called. False: nothing there,
-  // apart from error frames.
+  // Reads a batch if none is left. The frames' times are the kernel's until date() is called. False if nothing but
+  // error frames was waiting.
   bool fill() noexcept;
   void date() noexcept;
 
@@ -175,14 +175,14 @@ class SocketCanNetwork::Bus final : public CanBus {
   std::array<mmsghdr, batch_size> out_headers_{};
   std::array<iovec, batch_size> out_vectors_{};
   std::array<canfd_frame, batch_size> out_frames_{};
-  std::array<std::size_t, batch_size> out_places_{};  // in the caller's list
+  std::array<std::size_t, batch_size> out_places_{};  // index in the caller's list
   std::array<mmsghdr, batch_size> headers_{};
   std::array<iovec, batch_size> vectors_{};
   std::array<Message, batch_size> messages_{};
-  std::array<TimedFrame, batch_size> frames_{};  // decoded, those in [next_, count_) not yet handed out
+  std::array<TimedFrame, batch_size> frames_{};  // decoded; those in [next_, count_) aren't handed out yet
   std::size_t next_ = 0;
   std::size_t count_ = 0;
-  bool drained_ = false;  // the last batch took all there was: one receive() may say so without asking again
+  bool drained_ = false;  // the last batch emptied the socket, so the next receive() needn't ask
   std::uint32_t dropped_ = 0;
   std::int64_t last_time_ns_ = 0;
 };
@@ -250,8 +250,8 @@ void SocketCanNetwork::Bus::send_all(std::span<const CanFrame> frames, std::int6
   }
 }
 
-// sendmmsg() stops at the first frame that the kernel doesn't take and says why only if it was the first of the call:
-// so the rest goes with another call, until that one is the first, and then the rest after it.
+// sendmmsg() stops at the first frame that the kernel refuses, and gives the reason only if it was the call's first
+// frame. So the remaining frames go with another call.
 void SocketCanNetwork::Bus::hand_over(std::size_t count, SendResult* results) noexcept {
   std::size_t done = 0;
   while (done < count) {
@@ -279,7 +279,7 @@ bool SocketCanNetwork::Bus::receive(TimedFrame& out) noexcept {
   return true;
 }
 
-// The kernel writes the lengths: they are set anew for the next call.
+// The kernel has overwritten the lengths.
 void SocketCanNetwork::Bus::prepare(std::size_t i) noexcept {
   vectors_[i] = {&messages_[i].frame, sizeof(canfd_frame)};
   headers_[i].msg_hdr = {};
@@ -354,7 +354,7 @@ SocketCanNetwork::SocketCanNetwork(const std::vector<std::string>& interfaces, c
                                    CanSystem& system)
     : system_(system), clocks_(std::make_unique<Clocks>(system)) {
   if (interfaces.empty()) throw SetupError({.key = "--bus", .message = "no CAN interface named"});
-  // The kernel first: without CAN in it, no interface can exist, and that is what the user must know.
+  // The kernel first: without CAN in it no interface can exist, and the user must know that.
   const int probe = system_.open_raw_can();
   if (probe < 0) refuse_kernel(interfaces.front(), errno);
   system_.close(probe);
@@ -415,10 +415,10 @@ bool SocketCanNetwork::wait_for_frame(std::int64_t deadline_ns) noexcept {
         }
         return true;
       }
-      // Error frames only, or an interface that went down (reported once): wait on.
+      // Error frames only, or an interface that went down (reported once): keep waiting.
     }
     if (rest_ns > 0 && ready != 0) continue;
-    // The kernel is never early: what it waited for has passed.
+    // poll() never returns early, so the deadline has passed.
     if (ready == 0) {
       waited_ns_ += std::max<std::int64_t>(rest_ns, 0);
       for (const auto& bus : buses_) bus->known_empty();

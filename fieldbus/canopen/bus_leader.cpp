@@ -74,7 +74,7 @@ std::string LeaderWatch::signs() const {
 
 namespace {
 
-// Listens for all of the time; a watch for each bus.
+// Listens for all of time_ns, with one watch per bus.
 std::vector<LeaderWatch> listen(CanNetwork& network, std::span<const BusToLead> buses, Listening listening,
                                 std::int64_t time_ns, const FrameHandler& other) {
   std::vector<LeaderWatch> watches;
@@ -90,7 +90,7 @@ std::vector<LeaderWatch> listen(CanNetwork& network, std::span<const BusToLead> 
   return watches;
 }
 
-// Throws the problem of the first bus on which something was seen.
+// Throws `problem` for the first bus on which signs were seen.
 void refuse_if_seen(CanNetwork& network, std::span<const BusToLead> buses, const std::vector<LeaderWatch>& watches,
                     description::SetupProblem problem) {
   for (std::size_t i = 0; i < buses.size(); ++i) {

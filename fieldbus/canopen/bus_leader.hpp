@@ -1,9 +1,9 @@
-// Listen, then speak: whether somebody leads a bus already. Every command that sends on a bus asks this first.
+// Listens whether another controller already leads a bus. Every command that sends on a bus does this first.
 //
-// A leader shows by what only a leader sends: SYNC (080), NMT commands (000), the heartbeat of the controller's own
-// node, setpoints (RPDO 1 to 4: 200, 300, 400, 500 + node) and SDO requests (600 + node) for the nodes that are to be
-// led. The last ones are all that shows of a controller that is still at its set-up. What drives and sensors say by
-// themselves is no sign. Two that begin in the same moment both hear nothing: the first cycles tell
+// Signs of a leader are frames that only a leader sends: SYNC (080), NMT commands (000), the heartbeat of the
+// controller's node, and for the nodes to be led setpoints (RPDO 1 to 4: 200, 300, 400, 500 + node) and SDO requests
+// (600 + node), which alone show a controller at its set-up. Frames that drives and sensors send by themselves are no
+// sign. Two controllers that begin at the same moment detect each other only in their first cycles
 // (Fault::second_master).
 #pragma once
 
@@ -17,23 +17,21 @@
 
 namespace proxarm::fieldbus {
 
-// Longer than the longest SYNC period (255 ms) and than a controller's longest silence at its set-up.
+// Longer than the longest SYNC period (255 ms) and than a controller's longest pause at its set-up.
 inline constexpr std::int64_t listen_before_speaking_ns = 300'000'000;
 
-// What to listen for on a bus.
 enum class Listening : std::uint8_t {
   for_leader,  // SYNC, NMT, the controller's heartbeat; setpoints and SDO requests for the nodes
-  for_nodes,   // what the nodes themselves send: PDOs, EMCYs, SDO answers, heartbeats
+  for_nodes,   // frames sent by the nodes: PDOs, EMCYs, SDO answers, heartbeats
 };
 
-// What to listen to on one bus of the network.
 struct BusToLead {
   std::size_t bus = 0;
-  std::vector<std::uint8_t> nodes{};  // that are to be led; none: SYNC and NMT alone are signs
-  std::uint8_t master_node = 0;       // whose heartbeat would be somebody else's; 0: not looked at
+  std::vector<std::uint8_t> nodes{};  // nodes to be led; empty: only SYNC and NMT are signs
+  std::uint8_t master_node = 0;       // node of the controller's heartbeat; 0: heartbeats are ignored
 };
 
-// The signs of a leader, or of nodes, on one bus.
+// Counts the signs of a leader, or of nodes, on one bus.
 class LeaderWatch {
  public:
   explicit LeaderWatch(BusToLead bus, Listening listening = Listening::for_leader);
@@ -51,12 +49,12 @@ class LeaderWatch {
   std::map<std::uint32_t, std::uint64_t> counts_;  // by identifier
 };
 
-// Listens for `time_ns`, to its end, and throws SetupError where somebody leads one of the buses. Sends nothing. Every
-// frame goes to `other`, too.
+// Listens for `time_ns`, sending nothing; throws SetupError if another controller leads one of the buses. Every frame
+// also goes to `other`.
 void require_nobody_leads(CanNetwork& network, std::span<const BusToLead> buses,
                           std::int64_t time_ns = listen_before_speaking_ns, const FrameHandler& other = {});
-// The same for who is about to play the nodes of a bus: throws where one of them speaks already. A node that has
-// nothing to say in that time isn't heard.
+// The same before a simulation sends as the nodes of a bus: throws if one of them already sends. Silent nodes aren't
+// detected.
 void require_nobody_plays(CanNetwork& network, std::span<const BusToLead> buses,
                           std::int64_t time_ns = listen_before_speaking_ns);
 

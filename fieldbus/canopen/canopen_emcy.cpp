@@ -8,11 +8,11 @@ namespace {
 
 struct Wording {
   std::uint16_t code;
-  std::uint16_t mask;  // FFFF: this very code; FF00 and F000: the class
+  std::uint16_t mask;  // FFFF: exact code; FF00 and F000: class
   std::string_view text;
 };
 
-// Exact codes before classes: the first match wins.
+// Exact codes before classes: the first match is taken.
 constexpr Wording wordings[] = {
     {0x0000, 0xFFFF, "error reset or no error"},
     // CiA 402, drives

@@ -1,7 +1,7 @@
-// EMCY (CiA 301, 7.2.7): a drive says, once and by itself, that something went wrong, and once that it is over.
+// EMCY (CiA 301, 7.2.7): a drive reports an error once, and once that the error is over.
 //
-// Wire: identifier 080 + node, eight bytes: error code (u16, little-endian), error register (1001h), five bytes of the
-// maker's own. Code 0000 means: error reset or no error.
+// Wire: identifier 080 + node, eight bytes: error code (u16, little-endian), error register (1001h), five bytes that
+// the maker defines. Code 0000: error reset or no error.
 #pragma once
 
 #include <array>
@@ -22,16 +22,16 @@ struct Emergency {
   std::int64_t time_ns = 0;
 };
 
-// True when the frame is this node's EMCY. Shorter ones than eight bytes occur; what is missing reads as zero, but
-// without an error code it isn't one.
+// True if the frame is this node's EMCY. Frames may be shorter than eight bytes; missing bytes read as zero, but the
+// error code is required.
 bool decode_emcy(const CanFrame& frame, std::int64_t time_ns, std::uint8_t node, Emergency& out) noexcept;
 
-// Whether the drive goes on as before, by its own words: 8120h (its CAN controller counts many errors, but hears and
-// speaks), 8220h (a PDO was longer than its mapping, of which the first bytes count), and codes of the communication
-// (81xxh) and the maker's (FFxxh) with no bit in the error register. Any other is taken for a fault: CiA 301 and 402
-// have no class for warnings, a drive that trips says so by EMCY first, and not each fills its error register.
+// True if the drive works on: 8120h (its CAN controller counts many errors, but still communicates), 8220h (a PDO was
+// longer than its mapping; its first bytes count), and codes of communication (81xxh) or the maker (FFxxh) with an
+// empty error register. Any other code counts as a fault: CiA 301 and 402 have no warnings, a drive that trips reports
+// that by EMCY first, and some drives don't fill their error register.
 [[nodiscard]] bool is_warning(const Emergency& emergency) noexcept;
-// The wording of CiA 301 (classes) and CiA 402 (drives) for a code; the class's where the exact code isn't known.
+// The wording of CiA 301 (classes) or CiA 402 (drives); the class's wording if the exact code is unknown.
 [[nodiscard]] std::string_view emcy_text(std::uint16_t code) noexcept;
 // "EMCY 8130: life guard error or heartbeat error (error register 11: generic, communication)"
 [[nodiscard]] std::string describe(const Emergency& emergency);

@@ -1,8 +1,8 @@
-// Heartbeat (CiA 301, 7.2.8.3.2.2): how master and drives notice that the other has died.
+// Heartbeat (CiA 301, 7.2.8.3.2.2): master and drives notice when the other stops.
 //
 // Wire: identifier 700 + node, one byte: the NMT state; 0 is the boot-up message, sent once after a reset.
-// Master's side: HeartbeatProducer tells the drives that the *cycle* lives (they consume it by 1016h and stop by
-// themselves without it); one HeartbeatConsumer per drive watches the drive's own (1017h).
+// HeartbeatProducer sends the master's heartbeat, without which drives stop by themselves (1016h). One
+// HeartbeatConsumer per drive watches the drive's heartbeat (1017h).
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@ namespace proxarm::fieldbus {
 
 inline constexpr std::uint32_t heartbeat_id(std::uint8_t node) noexcept { return 0x700U + node; }
 
-// A heartbeat from a second thread would say nothing about the cycle; this one is sent from the cycle, and only when
-// the cycle's counter has moved since the last one.
+// Sends a heartbeat only if the cycle's counter has moved. It is called from the cycle: a heartbeat from another thread
+// would go on after the cycle has stopped.
 class HeartbeatProducer {
  public:
   HeartbeatProducer(std::uint8_t node, std::int64_t period_ns) noexcept : node_(node), period_ns_(period_ns) {}
 
-  // True when a heartbeat is due, and writes it to `frame`. `cycle` counts completed cycles.
+  // True if a heartbeat is due and was written to `frame`. `cycle` counts completed cycles.
   [[nodiscard]] bool due(std::int64_t now_ns, std::uint64_t cycle, CanFrame& frame) noexcept;
   void archive(StateArchive& state) noexcept { state(next_ns_, last_cycle_, ever_); }
 
@@ -35,15 +35,15 @@ class HeartbeatProducer {
 
 class HeartbeatConsumer {
  public:
-  // `timeout_ns` 0: only the state is followed, nothing is ever called lost.
+  // `timeout_ns` 0: follows the state, but never reports a loss.
   HeartbeatConsumer(std::uint8_t node, std::int64_t timeout_ns) noexcept : node_(node), timeout_ns_(timeout_ns) {}
 
-  // True when the frame was this node's heartbeat or boot-up message.
+  // True if the frame was this node's heartbeat or boot-up message.
   bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept;
   [[nodiscard]] NmtState state() const noexcept { return state_; }
   [[nodiscard]] std::uint64_t boot_ups() const noexcept { return boot_ups_; }
   [[nodiscard]] bool heard() const noexcept { return heard_; }
-  // As the standard has it, watching starts with the first heartbeat; restart() makes it start now.
+  // Watching starts with the first heartbeat, as in the standard, or with restart().
   [[nodiscard]] bool lost(std::int64_t now_ns) const noexcept {
     return timeout_ns_ > 0 && heard_ && now_ns - last_ns_ > timeout_ns_;
   }

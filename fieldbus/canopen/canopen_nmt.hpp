@@ -20,13 +20,13 @@ enum class NmtCommand : std::uint8_t {
   reset_communication = 0x82,    // communication profile area only
 };
 
-// The states as heartbeat and boot-up messages report them (7.2.8.3.2).
+// NMT states in heartbeat and boot-up messages (7.2.8.3.2).
 enum class NmtState : std::uint8_t {
   boot_up = 0x00,
   stopped = 0x04,
   operational = 0x05,
   pre_operational = 0x7F,
-  unknown = 0xFF,  // nothing heard yet, or a value that the standard doesn't know
+  unknown = 0xFF,  // nothing received yet, or a value that the standard doesn't define
 };
 
 // `node` 0..127.

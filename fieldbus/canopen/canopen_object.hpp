@@ -1,4 +1,4 @@
-// The address of one entry of a CANopen object dictionary, and how messages to the user write it.
+// The address of an entry of a CANopen object dictionary, and its text in messages to the user.
 #pragma once
 
 #include <cstdint>

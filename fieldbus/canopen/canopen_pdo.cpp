@@ -16,7 +16,7 @@ std::uint16_t mapping_index(PdoDirection direction, std::uint8_t number) noexcep
   return static_cast<std::uint16_t>((direction == PdoDirection::receive ? 0x1600 : 0x1A00) + number - 1);
 }
 
-// Bit 30 of a read-back is the drive's own affair: some hold it at 1, some at 0.
+// Bit 30 isn't compared when read back: some drives hold it at 1, some at 0.
 SdoStep cob_id_step(PdoDirection direction, std::uint8_t number, std::uint32_t cob_id, const char* name) {
   if (direction == PdoDirection::transmit) cob_id |= no_remote_request;
   SdoStep step = sdo_write({communication_index(direction, number), 1}, 4, cob_id, name);
@@ -51,9 +51,9 @@ std::uint32_t mapping_entry(const MappedObject& mapped) noexcept {
          mapped.bits;
 }
 
-// Where a drive's mapping is its maker's, it is taken if it is what is wanted. A transmit PDO may carry more behind
-// that, which nobody reads; a receive PDO that is synchronous but not cyclic (type 0) acts at the same SYNC, one that
-// isn't synchronous (254, 255) as soon as it comes.
+// A fixed mapping of the drive is accepted if it is the wanted one. A transmit PDO may carry further objects at its
+// end. A receive PDO of type 0 (synchronous, acyclic) acts at the same SYNC; one of type 254 or 255 (asynchronous) acts
+// on reception.
 std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo) {
   check(pdo);
   const bool receive = pdo.direction == PdoDirection::receive;
@@ -99,8 +99,8 @@ SdoStep disable_pdo_step(PdoDirection direction, std::uint8_t number, std::uint8
   SdoStep step =
       if_present(cob_id_step(direction, number, does_not_exist | pdo_id(direction, number, node),
                              direction == PdoDirection::receive ? "unused RPDO COB-ID" : "unused TPDO COB-ID"));
-  step.mask = does_not_exist;  // which identifier an unused one keeps doesn't matter
-  // One that can't be disabled is nothing to worry about where only the controller could send it.
+  step.mask = does_not_exist;  // an unused PDO may keep any identifier
+  // A receive PDO that can't be disabled is harmless: only the controller could send it.
   if (direction == PdoDirection::transmit) step.as_found = {step.value};
   return step;
 }

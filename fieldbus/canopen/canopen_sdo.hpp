@@ -3,12 +3,14 @@
 // Wire: request 600 + node, answer 580 + node, eight bytes each, numbers little-endian. Byte 0 holds the command:
 //   upload   initiate 40 → 4x expedited (n = bytes unused, bits 2–3), 41 segmented with size; segment 60|t<<4 → t|n|c
 //   download initiate 2x expedited, 21 segmented with size → 60; segment t<<4|n<<1|c → 20|t<<4
-//   block download C6 → A4 blksize; 7-byte segments numbered 1..blksize (bit 7: last) → A2 ackseq blksize; C1|n<<2 crc
-//   → A1 block upload A4 blksize → C6 size; A3 → segments; A2 ackseq blksize; C1|n<<2 crc → A1 abort 80, object, code
-//   (either side, at any time)
+//   block download C6 → A4 blksize; 7-byte segments numbered 1..blksize (bit 7: last) → A2 ackseq blksize;
+//                  C1|n<<2 crc → A1
+//   block upload   A4 blksize → C6 size; A3 → segments; A2 ackseq blksize; C1|n<<2 crc → A1
+//   abort          80, object, code (either side, at any time)
 //
-// A small state machine that never blocks: give it frames and the time, ask it whether it has finished. Several can run
-// side by side (one per node; a node has one SDO channel). Used before and after the cycle, never in it: it allocates.
+// SdoClient is a state machine that never blocks: it gets frames and the time, and reports whether the transfer has
+// finished. Several can run side by side, one per node, as a node has one SDO channel. For use before and after the
+// cycle, never in it: it allocates.
 #pragma once
 
 #include <cstdint>
@@ -23,49 +25,49 @@
 namespace proxarm::fieldbus {
 
 enum class SdoOutcome : std::uint8_t {
-  idle,  // nothing asked yet
+  idle,  // nothing requested yet
   running,
-  done,               // data() holds what was read
-  aborted_by_server,  // abort_code() says why
+  done,               // data() has the value read
+  aborted_by_server,  // see abort_code()
   aborted_by_client,  // the answer broke the protocol; abort_code() was sent to the server
-  timed_out,          // no answer in time; the server was told (05040000)
+  timed_out,          // no answer in time; abort 05040000 was sent to the server
   not_sent,           // bus off or interface down
 };
 
 enum class SdoTransfer : std::uint8_t {
   automatic,  // expedited up to four bytes, else segmented
-  block,      // block transfer whatever the size
+  block,      // block transfer for any size
 };
 
 struct SdoClientConfig {
   std::int64_t timeout_ns = 200'000'000;    // for each answer
   std::uint8_t block_size = 127;            // segments in a block upload, 1..127
   std::size_t max_upload_bytes = 1U << 20;  // a server that sends more is aborted (05040005)
-  int max_block_repeats = 3;                // sub-blocks sent or asked again without progress
+  int max_block_repeats = 3;                // sub-blocks sent or requested again without progress
 };
 
 // CRC-16 of block transfers: x¹⁶ + x¹² + x⁵ + 1, start 0, not reflected. The string "123456789" gives 31C3.
 [[nodiscard]] std::uint16_t sdo_crc(std::span<const std::uint8_t> bytes, std::uint16_t crc = 0) noexcept;
 
-// Requests of one frame, for who keeps account of the answers himself, as the cycle must. `bytes`: 1 to 4.
+// Requests of one frame, for callers that match the answers themselves, as the cycle does. `bytes`: 1 to 4.
 [[nodiscard]] CanFrame expedited_download(std::uint8_t node, ObjectAddress object, std::uint8_t bytes,
                                           std::uint32_t value) noexcept;
 [[nodiscard]] CanFrame upload_request(std::uint8_t node, ObjectAddress object) noexcept;
-// Whether an answer is about this object.
+// True if an answer is about this object.
 [[nodiscard]] bool names_object(const CanFrame& frame, ObjectAddress object) noexcept;
 
 class SdoClient {
  public:
   SdoClient(CanBus& bus, std::uint8_t node, const SdoClientConfig& config = {});
 
-  // Either gives up a running transfer (the server is told) and starts a new one.
+  // Each aborts a running transfer (also at the server) and starts a new one.
   void start_upload(ObjectAddress object, std::int64_t now_ns, SdoTransfer transfer = SdoTransfer::automatic);
   void start_download(ObjectAddress object, std::span<const std::uint8_t> data, std::int64_t now_ns,
                       SdoTransfer transfer = SdoTransfer::automatic);
 
-  // True when the frame is an SDO answer of this node; stale ones are swallowed.
+  // True if the frame is an SDO answer of this node. Stale answers are only counted.
   bool on_frame(const CanFrame& frame, std::int64_t now_ns);
-  // Sends what the interface's queue had no room for, and notices that an answer is overdue.
+  // Sends a frame that the interface's full queue refused, and detects a missing answer.
   void poll(std::int64_t now_ns);
 
   [[nodiscard]] bool finished() const noexcept { return outcome_ != SdoOutcome::running; }
@@ -75,7 +77,7 @@ class SdoClient {
   [[nodiscard]] ObjectAddress object() const noexcept { return object_; }
   [[nodiscard]] std::uint8_t node() const noexcept { return node_; }
   [[nodiscard]] std::uint64_t stale_answers() const noexcept { return stale_answers_; }
-  // When poll() should be called at the latest (while running).
+  // Latest time for the next call of poll() while running.
   [[nodiscard]] std::int64_t wake_ns(std::int64_t now_ns) const noexcept;
 
   [[nodiscard]] static std::uint32_t request_id(std::uint8_t node) noexcept { return 0x600U + node; }
@@ -132,19 +134,19 @@ class SdoClient {
   std::int64_t now_ns_ = 0;
   std::int64_t deadline_ns_ = 0;
   std::uint64_t stale_answers_ = 0;
-  CanFrame unsent_{};  // the interface's queue was full
+  CanFrame unsent_{};  // waits because the interface's queue was full
   bool has_unsent_ = false;
 
   bool toggle_ = false;
-  std::size_t position_ = 0;  // bytes of a download that are out
+  std::size_t position_ = 0;  // bytes of a download sent so far
   std::size_t segment_bytes_ = 0;
   bool size_known_ = false;
   std::size_t expected_size_ = 0;
 
   bool crc_used_ = false;
-  std::uint8_t block_size_ = 0;  // segments of a block, as the server wants them
+  std::uint8_t block_size_ = 0;  // segments per block, requested by the server
   std::uint8_t sequence_ = 0;    // last segment sent, or last one accepted in order
-  std::size_t block_start_ = 0;  // position_ where the block began
+  std::size_t block_start_ = 0;  // position_ at the start of the block
   bool last_segment_ = false;
   int repeats_ = 0;
 };

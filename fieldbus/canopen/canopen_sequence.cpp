@@ -139,7 +139,7 @@ void SdoSequence::on_answer(std::int64_t now_ns) {
 void SdoSequence::on_value(std::int64_t now_ns) {
   const SdoStep& step = steps_[next_];
   const auto data = client_.data();
-  // A node that doesn't give a size sends four bytes, of which the object's own count.
+  // A node that doesn't report a size sends four bytes; the object's first bytes count.
   if (data.size() < step.bytes || data.size() > 4) {
     fail(std::to_string(data.size()) + " bytes", std::to_string(step.bytes) + " bytes",
          "the object has another type than the profile gives it; is the device of the expected make?");
@@ -168,7 +168,7 @@ void SdoSequence::on_value(std::int64_t now_ns) {
   advance(now_ns);
 }
 
-// What can't be written, or stays what it was: fine if it is what is wanted or fits as well.
+// Accepts an object that couldn't be written, or didn't change, if it has the wanted or a permitted value.
 void SdoSequence::take_as_found(std::uint32_t value, std::int64_t now_ns) {
   const SdoStep& step = steps_[next_];
   const auto is = [&](std::uint32_t wanted) { return ((value ^ wanted) & step.mask & size_mask(step.bytes)) == 0; };
@@ -210,8 +210,8 @@ std::vector<std::string> SdoSequence::losses() const {
   return all;
 }
 
-// What a node refuses because of what the object is, and what because of the value: many have fewer option codes and
-// narrower ranges than the profile. Of an optional object the value is its maker's then, as if it weren't there.
+// Whether a write was refused because of the object or because of the value: many nodes have fewer option codes and
+// narrower ranges than the profile. An optional object then keeps the maker's value.
 SdoSequence::Refused SdoSequence::refused_by(std::uint32_t code) const noexcept {
   constexpr std::uint32_t by_object[] = {sdo_abort::unsupported_access, sdo_abort::write_of_read_only,
                                          sdo_abort::not_transferable, sdo_abort::local_control,
@@ -261,7 +261,7 @@ void SdoSequence::on_failure(std::int64_t now_ns) {
         return;
       }
       if (looks_at_what_is_there(code, now_ns)) return;
-      // What can't be read either is told by what became of the write.
+      // If reading fails as well, the refusal of the write is reported.
       failed_abort_ = refused_ == Refused::no ? code : refusal_;
       fail(describe_sdo_abort(failed_abort_),
            writing_ || refused_ != Refused::no ? "to write " + value_text(step.value, step.bytes)

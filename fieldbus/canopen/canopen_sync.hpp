@@ -1,6 +1,6 @@
-// SYNC (CiA 301, 7.2.5): the frame that makes all drives latch their targets and sample their positions at one moment.
+// SYNC (CiA 301, 7.2.5): the frame on which all drives latch their targets and sample their positions together.
 //
-// Wire: identifier 080, no data; or one byte, a counter from 1 to the overflow value of 1019h, where drives use it.
+// Wire: identifier 080, no data; or one byte, a counter from 1 to the overflow value of 1019h, for drives that use it.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ class SyncProducer {
   std::uint8_t counter_ = 0;
 };
 
-// 1006h holds the period in whole microseconds; nothing if this one isn't, or doesn't fit.
+// 1006h holds whole microseconds; nullopt if the period isn't whole, or doesn't fit.
 [[nodiscard]] std::optional<std::uint32_t> sync_period_us(std::int64_t period_ns) noexcept;
 
 }  // namespace proxarm::fieldbus

@@ -35,7 +35,8 @@ struct Answer {
   std::optional<std::uint32_t> value;
 };
 
-// 80: abort. 010x nnes with e set: expedited, n bytes of four unused where s says so. Longer objects aren't asked for.
+// Byte 0: 80 is an abort; 010x nnes with e set is expedited (with s set, nn of the four bytes are unused). Longer
+// objects aren't read.
 std::optional<Answer> answer_of(const CanFrame& frame, std::uint8_t node, ObjectAddress object) {
   if (frame.extended || frame.remote || frame.error || frame.length != 8 || frame.id != from_server + node) return {};
   if (read_u16_le(&frame.data[1]) != object.index || frame.data[3] != object.sub) return {};

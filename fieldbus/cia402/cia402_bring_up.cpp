@@ -69,7 +69,7 @@ DriveIdentity identity_of(const SdoSequence& sequence) {
           value(0x1018, 4), value(0x6502, 0), sequence.missing()};
 }
 
-// Whether a drive's exchange ended at feedback that it hasn't got and that can be left out; then all begin anew.
+// True if a drive refused feedback that can be left out; then all drives must be configured again.
 bool some_feedback_given_up(Slots drives, const std::vector<SdoSequence>& sequences) {
   bool given_up = false;
   for (std::size_t i = 0; i < sequences.size(); ++i) {
@@ -79,7 +79,7 @@ bool some_feedback_given_up(Slots drives, const std::vector<SdoSequence>& sequen
   return given_up;
 }
 
-// The same exchange with every drive, side by side. nullopt: something was given up, so that it must be done again.
+// One exchange with every drive, side by side. nullopt: feedback was left out, so it must be repeated.
 std::optional<std::vector<DriveIdentity>> try_to_configure(CanNetwork& network, Slots drives,
                                                            const FrameHandler& handler, const StepsOf& steps_of) {
   std::vector<std::uint64_t> boot_ups;
@@ -95,7 +95,7 @@ std::optional<std::vector<DriveIdentity>> try_to_configure(CanNetwork& network, 
   return identities;
 }
 
-// Each time feedback becomes less, so it ends.
+// Ends, since each repetition has less feedback.
 std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const FrameHandler& handler,
                                      const StepsOf& steps_of) {
   for (;;) {

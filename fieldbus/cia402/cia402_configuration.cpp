@@ -1,4 +1,4 @@
-// What a CiA 402 drive is told before the cycle, and what is said of it in words.
+// The configuration of a CiA 402 drive before the cycle, and descriptions of the drive in words.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,12 +18,12 @@ using description::number_text;
 using description::SetupError;
 
 constexpr std::uint32_t servo_drive = 0x00020192;       // 1000h: CiA 402, of type servo drive
-constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h when the drive gets round to it
+constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h with a delay
 
 constexpr const char* period_advice =
     "take a period of one to three digits of microseconds or milliseconds, such as 0.5ms, 1ms, 2ms, 4ms";
 
-// The session's, with the times that this drive needs.
+// The session's settings with this drive's timeouts.
 DriveSettings settings_of(const description::DriveDescription& drive, DriveSettings settings) {
   settings.validate();
   const auto to_ns = [](double seconds) { return std::llround(1e9 * seconds); };
@@ -66,7 +66,7 @@ void append(std::vector<SdoStep>& steps, const std::vector<SdoStep>& more) {
 }
 
 void append_identity(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
-  // The first step is also the one that finds out whether the node is there at all.
+  // This first step also shows whether the node exists at all.
   steps.push_back(
       sdo_expect({0x1000, 0}, 4, drive.device_type.value_or(servo_drive), "device type",
                  "is another device set to this node, or is device_type in the cell's file not this drive's?"));
@@ -80,7 +80,7 @@ void append_identity(std::vector<SdoStep>& steps, const description::DriveDescri
                              mode.unsupported, supported));
 }
 
-// Quiet first: nothing but what the cycle needs may be on the bus.
+// First disables all other PDOs, to leave the bus to the cycle.
 void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescription& drive, std::uint16_t timeout_ms,
                  std::uint32_t inputs_object, bool torque_feedback) {
   const std::uint8_t node = drive.node;
@@ -95,8 +95,8 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .event_timer_ms = timeout_ms,
                            .fd = drive.fd,
                            .mapping = rpdo_mapping(drive)}));
-  // The last torque acts until this timer runs out: a drive without it would go on for as long as the heartbeat lasts.
-  // It is all that stops a drive which doesn't watch the heartbeat.
+  // The last torque acts until this timer runs out, or else until the heartbeat's timeout. For a drive that doesn't
+  // watch the heartbeat, the timer is the only stop.
   if (mode_of(drive).torque || drive.bring_up.stops_by == description::StopsBy::setpoint_timer) {
     for (SdoStep& step : steps) {
       if (step.object == ObjectAddress{0x1400, 5}) step.is_optional = false;
@@ -118,22 +118,21 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .mapping = {{object_address(inputs_object), 32}}}));
 }
 
-// The drive itself keeps to the torque and the speed that the cell allows. 6076h is the motor's, before the gear, in
-// mNm.
+// The drive itself limits torque and speed to the cell's values. 6076h is the motor's torque before the gear, in mNm.
 void append_torque(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
   const auto rated_mNm = static_cast<std::uint32_t>(std::llround(1e3 * drive.rated_torque_Nm / drive.gear_ratio));
   const auto most = static_cast<std::uint32_t>(std::llround(1e3 * drive.max_torque_Nm / drive.rated_torque_Nm));
   const double rpm = 60.0 / (2.0 * std::numbers::pi) * drive.max_speed_rad_per_s * drive.gear_ratio;
   SdoStep rated = sdo_expect({0x6076, 0}, 4, rated_mNm, "motor rated torque (mNm)",
                              "is rated_torque_Nm in the cell's file this motor's, times its gear_ratio?");
-  rated.is_state = true;  // the drive learns its motor
+  rated.is_state = true;  // the drive gets its motor's data at set-up
   steps.push_back(if_present(rated));
   steps.push_back(sdo_write({0x6072, 0}, 2, most, "max torque"));
   steps.push_back(if_present(sdo_write({0x6080, 0}, 4, static_cast<std::uint32_t>(std::ceil(rpm)), "max motor speed")));
 }
 
-// By which the drive watches the controller. Off first: one that still watches for the last session's controller would
-// trip in the middle of this set-up.
+// Lets the drive watch the controller. First off, as a drive that still watches for the last session's controller would
+// trip during this set-up.
 void append_heartbeat(std::vector<SdoStep>& steps, std::uint32_t consumer) {
   for (const std::uint32_t value : {0U, consumer}) {
     SdoStep step = sdo_write({0x1016, 1}, 4, value, "consumer heartbeat time (of the controller)");
@@ -145,7 +144,7 @@ void append_heartbeat(std::vector<SdoStep>& steps, std::uint32_t consumer) {
   }
 }
 
-// The same by life guarding (CiA 301): the drive stops when nobody has asked for its state for guard time × factor.
+// The same by life guarding (CiA 301): the drive stops if its state isn't requested for guard time × factor.
 void append_life_guarding(std::vector<SdoStep>& steps, const DriveSettings& settings) {
   for (const std::uint32_t time_ms : {0U, std::uint32_t{settings.master_heartbeat_ms}}) {
     steps.push_back(sdo_write({0x100C, 0}, 2, time_ms, "guard time (of the controller)"));
@@ -153,7 +152,7 @@ void append_life_guarding(std::vector<SdoStep>& steps, const DriveSettings& sett
   steps.push_back(sdo_write({0x100D, 0}, 1, settings.life_time_factor(), "life time factor"));
 }
 
-// What is written before the PDOs are mapped, because the drive wants it so.
+// Values that the drive needs before its PDOs are mapped.
 void append_start_up(std::vector<SdoStep>& steps, const description::BringUp& bring_up) {
   for (const description::StartUpWrite& write : bring_up.write) {
     steps.push_back(sdo_write(object_address(write.object), static_cast<std::uint8_t>(write.bits / 8), write.value,
@@ -161,16 +160,15 @@ void append_start_up(std::vector<SdoStep>& steps, const description::BringUp& br
   }
 }
 
-// What the drive does when we are gone or when it is told to stop. 1016h is a must, since it is what stops the arm when
-// the controller dies, unless the cell says what else does; the others have defaults in the standard that
-// stop it too.
+// Reactions to a lost controller, and to stops. 1016h is required, since it stops the arm when the controller dies,
+// unless the cell names another means. The other objects have defaults in the standard that also stop it.
 void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings,
                       const description::BringUp& bring_up) {
   if (bring_up.stops_by == description::StopsBy::heartbeat) append_heartbeat(steps, settings.consumer_heartbeat());
   if (bring_up.stops_by == description::StopsBy::life_guarding) append_life_guarding(steps, settings);
   steps.push_back(sdo_write({0x1017, 0}, 2, settings.drive_heartbeat_ms, "producer heartbeat time"));
   steps.push_back(if_present(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));
-  // Where it is the maker's: a fault or no voltage stops the arm, too. 0, no action, is refused.
+  // If the maker fixed it: fault (1) and disable voltage (2) also stop the arm; no action (0) is refused.
   steps.push_back(or_found(if_present(sdo_write({0x6007, 0}, 2, 3, "abort connection option code (quick stop)"),
                                       "how it stops without the controller is its own affair"),
                            {3, 1, 2}));
@@ -194,7 +192,7 @@ PeriodSteps ServoDrive::period_steps(std::int64_t from_ns, std::int64_t to_ns) c
   PeriodStep value{object_address(description_.objects.interpolation_value), 1, to.units, from.units};
   PeriodStep index{object_address(description_.objects.interpolation_index), 1, as_u8(to.exponent),
                    as_u8(from.exponent)};
-  // In between the period is to.units · 10^from.exponent, or the other way round.
+  // Between the writes the period is to.units · 10^from.exponent, or from.units · 10^to.exponent.
   const bool value_first = to.units * std::pow(10.0, from.exponent) >= from.units * std::pow(10.0, to.exponent);
   const PeriodStep sync{{0x1006, 0}, 4, sync_period_us(to_ns).value_or(0), sync_period_us(from_ns).value_or(0), true};
   const PeriodStep timer{{0x1400, 5},
@@ -274,12 +272,12 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
   if (!description_.device_type) description_.device_type = cia402_device_type(*eds_);
   leave_out_what_eds_lacks();
   EdsLosses losses;
-  (void)steps_by_eds(profile_steps(), *eds_, description_, &losses);  // says what doesn't fit
+  (void)steps_by_eds(profile_steps(), *eds_, description_, &losses);  // for its losses and its SetupErrors
   losses_.insert(losses_.end(), losses.missing.begin(), losses.missing.end());
   fixed_by_eds_ = losses.fixed;
 }
 
-// Stability was judged with it.
+// Must not be left out: stability was judged with it.
 bool ServoDrive::is_gear_torque(const MappedObject& object) const noexcept {
   return description_.gear_torque && object.object == object_address(description_.gear_torque->object);
 }
@@ -363,7 +361,7 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
   return steps;
 }
 
-// What is skipped must be what a drive may do without.
+// Refuses to skip a step that isn't optional.
 void ServoDrive::note_skipped() {
   const std::vector<SdoStep> steps = all_profile_steps();
   for (const std::uint32_t object : description_.bring_up.skip) {
@@ -395,7 +393,7 @@ std::vector<SdoStep> ServoDrive::all_profile_steps() const {
   append_start_up(steps, description_.bring_up);
   append_pdos(steps, description_, rpdo_timeout_ms(settings_, settings_.period_ns, mode_.torque),
               settings_.inputs_object, torque_feedback_);
-  // A drive may have one of both for good: it fits where it is what this period needs.
+  // A drive may have fixed one of both; that is fine if it is the needed value.
   steps.push_back(or_found(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,
                                      "interpolation time period value"),
                            {period.units}));
@@ -405,7 +403,7 @@ std::vector<SdoStep> ServoDrive::all_profile_steps() const {
   steps.push_back(
       if_present(sdo_write({0x1006, 0}, 4, *sync_period_us(settings_.period_ns), "communication cycle period")));
   append_reactions(steps, settings_, description_.bring_up);
-  // Ramps of the stops above, in counts/s² (the profile's default unit).
+  // Deceleration of these stops, in counts/s² (the profile's default unit).
   if (const auto ramp = scale_.size_counts(description_.max_acceleration_rad_per_s2); ramp && *ramp > 0) {
     steps.push_back(if_present(sdo_write({0x6084, 0}, 4, *ramp, "profile deceleration")));
     steps.push_back(if_present(sdo_write({0x6085, 0}, 4, *ramp, "quick stop deceleration")));
@@ -417,7 +415,7 @@ std::vector<SdoStep> ServoDrive::all_profile_steps() const {
   if (mode_.torque) append_torque(steps, description_);
   steps.push_back(or_found(sdo_write(object_address(description_.objects.mode), 1, mode_.number, "modes of operation"),
                            {mode_.number}));
-  if (description_.bring_up.shows_mode_enabled) return steps;  // the cycle looks at it, in TPDO1
+  if (description_.bring_up.shows_mode_enabled) return steps;  // the cycle watches it in TPDO1
   SdoStep display = sdo_expect(object_address(description_.objects.mode_display), 1, mode_.number,
                                "modes of operation display", mode_.not_taken);
   display.is_state = true;
@@ -426,7 +424,7 @@ std::vector<SdoStep> ServoDrive::all_profile_steps() const {
   return steps;
 }
 
-// Where it stood when operation was given up, and what to look for.
+// The state in which enabling was abandoned, and what the user should look for.
 std::string ServoDrive::stuck_text() const {
   const auto word = static_cast<std::uint16_t>(stuck_);
   const DriveState state = decode_state(word);

@@ -11,8 +11,8 @@
 namespace proxarm::fieldbus {
 namespace {
 
-constexpr int syncs_before_enable = 3;  // that must have latched target = actual before 0F
-// So many cycles in a row with two TPDOs: late ones and doubled frames of a bad line don't come at each SYNC.
+constexpr int syncs_before_enable = 3;  // with target = actual, before 0F
+// Consecutive cycles with two TPDOs that mean two nodes. Late and doubled frames of a bad line don't come at each SYNC.
 constexpr std::uint32_t most_doubled_cycles = 10;
 
 }  // namespace
@@ -34,7 +34,7 @@ void ServoDrive::start_cycle(std::int64_t now_ns) noexcept {
   boot_ups_at_start_ = heartbeat_.boot_ups();
   tpdos_in_cycle_ = doubled_cycles_ = 0;
   cycles_without_tpdo_ = 0;
-  fresh_ = true;  // nothing was due before the first SYNC
+  fresh_ = true;  // no TPDO was due before the first SYNC
 }
 
 void ServoDrive::raise(DriveFault fault) noexcept {
@@ -56,7 +56,7 @@ void ServoDrive::judge_doubled() noexcept {
 
 void ServoDrive::on_sync(std::int64_t now_ns) noexcept {
   judge_doubled();
-  // The drive latches the RPDO sent before this SYNC.
+  // This SYNC makes the drive latch the RPDO sent before.
   if (held_pending_) ++held_;
   held_pending_ = false;
   if (!fresh_ && cycles_without_tpdo_ < UINT32_MAX) ++cycles_without_tpdo_;
@@ -68,10 +68,10 @@ bool ServoDrive::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept 
   if (frame.extended || frame.remote || frame.error) return false;
   if (frame.id == pdo_id(PdoDirection::transmit, 1, node())) return decode_tpdo(frame);
   if (Emergency emergency; decode_emcy(frame, time_ns, node(), emergency)) {
-    if (emergency.code == 0) return true;  // an error is over; the latest one stays readable
+    if (emergency.code == 0) return true;  // reports the end of an error; the latest error stays readable
     emergency_ = emergency;
     ++emergencies_;
-    if (frame.length > 2 && is_warning(emergency)) {  // with an error register
+    if (frame.length > 2 && is_warning(emergency)) {  // includes an error register
       ++warnings_;
       return true;
     }
@@ -113,7 +113,7 @@ bool ServoDrive::decode_tpdo(const CanFrame& frame) noexcept {
   state_ = decode_state(statusword_);
   const bool enabled = state_ == DriveState::operation_enabled;
   if (state_ != DriveState::switched_on) held_ = 0;
-  // Once it follows, it is commanded until it leaves operation enabled: bit 12 may drop at a limit.
+  // Once following, it stays so until it leaves operation enabled: bit 12 may drop at a limit.
   following_ = enabled && (following_ || (follows_command() && shows_mode()));
   if (goal_ == DriveGoal::operation_enabled) judge_state(was_enabled);
   return true;
@@ -174,7 +174,7 @@ bool ServoDrive::guard_request(CanFrame& frame) const noexcept {
   frame = CanFrame{};
   frame.id = heartbeat_id(node());
   frame.remote = true;
-  frame.length = 1;  // of the answer
+  frame.length = 1;  // length of the answer
   return true;
 }
 
@@ -190,7 +190,7 @@ bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
   frame = CanFrame{};
   frame.id = pdo_id(PdoDirection::receive, 1, node());
   frame.fd = frame.bit_rate_switch = description_.fd;
-  frame.length = rpdo_bytes_;  // 4 or 6: a length that CAN FD has as well
+  frame.length = rpdo_bytes_;  // 4 or 6, also valid lengths of CAN FD
   const unsigned bits = mode_.controlword_bits | description_.bring_up.controlword_bits;
   const bool enables = controlword_ == controlword::enable_operation;
   write_u16_le(&frame.data[0], static_cast<std::uint16_t>(controlword_ | (enables ? bits : 0U)));

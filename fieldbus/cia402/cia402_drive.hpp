@@ -1,13 +1,13 @@
-// One CiA 402 servo drive in a cyclic mode (positions or torques), as the master's cycle sees it.
+// One CiA 402 servo drive in a cyclic mode (positions or torques): its configuration, power state machine and PDOs.
 //
-// Wire, every SYNC (identifiers of the predefined connection set): TPDO1 180 + node and RPDO1 200 + node, what they
-// carry by mode in cia402_mode.hpp; plus EMCY 080 + node and heartbeat 700 + node, as they come.
+// Wire, every SYNC (identifiers of the predefined connection set): TPDO1 180 + node and RPDO1 200 + node, with contents
+// by mode (cia402_mode.hpp); EMCY 080 + node and heartbeat 700 + node at any time.
 //
-// A cycle: on_sync(); on_frame() for what comes in; set_target_rad() where following(); encode_rpdo(), send. All of
-// that is noexcept and allocates nothing. The target follows the actual position until the drive itself says that it
-// follows (operation enabled and statusword bit 12: the brake is open), and at least three SYNCs have latched such a
-// target before 0F (enable operation) is sent: otherwise the axis would jump. A torque may be set at any time: the
-// drive applies it once its brake is open, and the axis falls where it isn't what holds it.
+// A cycle: on_sync(); on_frame() for received frames; set_target_rad() if following(); encode_rpdo(), send. These are
+// noexcept and allocate nothing. The target follows the actual position until the drive follows targets (operation
+// enabled and statusword bit 12: the brake is open). At least three SYNCs must have latched such a target before 0F
+// (enable operation) is sent: otherwise the axis would jump. A torque may be set at any time: the drive applies it once
+// its brake is open, and the axis falls if the torque doesn't hold it.
 #pragma once
 
 #include <algorithm>
@@ -31,115 +31,116 @@
 
 namespace proxarm::fieldbus {
 
-// What all drives of a session share. Times that go on the wire as milliseconds have that unit.
+// Settings that all drives of a session share. Times that are sent in milliseconds are in milliseconds here.
 struct DriveSettings {
-  std::int64_t period_ns = 1'000'000;              // of SYNC; must fit 60C2h and 1006h exactly
-  std::uint8_t master_node = 127;                  // whose heartbeat the drives consume
-  std::uint16_t master_heartbeat_ms = 20;          // how often the cycle sends it
-  std::uint16_t master_heartbeat_timeout_ms = 60;  // 1016h:01: without it the drives stop by themselves
+  std::int64_t period_ns = 1'000'000;              // of SYNC; 60C2h and 1006h must hold it exactly
+  std::uint8_t master_node = 127;                  // node whose heartbeat the drives consume
+  std::uint16_t master_heartbeat_ms = 20;          // period of the cycle's heartbeat
+  std::uint16_t master_heartbeat_timeout_ms = 60;  // 1016h:01; without the heartbeat the drives stop
   std::uint16_t drive_heartbeat_ms = 50;           // 1017h
-  std::uint16_t drive_heartbeat_timeout_ms = 150;  // of the master for the drives
-  // false: the drives' heartbeats end with the set-up. A TPDO at every SYNC, which ends with NMT operational as well,
-  // says the same fifty times as often, and heartbeats that coincide would cost a full bus its setpoints' deadline.
+  std::uint16_t drive_heartbeat_timeout_ms = 150;  // the master's timeout for drives
+  // false: the drives' heartbeats end with the set-up. A TPDO at every SYNC, which also ends outside of operational,
+  // shows the same fifty times as often, and coinciding heartbeats would delay a full bus's setpoints beyond their
+  // deadline.
   bool heartbeat_in_operation = true;
   std::uint16_t rpdo_timeout_periods = 5;  // 1400h:05, rounded up to whole milliseconds
-  // The same in torque mode, rounded down: the last torque acts until then, and a third one missed must be the last.
+  // The same in torque mode, rounded down: the last torque acts until then, and the third missed one must be the last.
   std::uint16_t torque_timeout_periods = 3;
   double following_error_window_rad = 0.05;    // 6065h, at the joint
   std::uint16_t following_error_time_ms = 10;  // 6066h
-  // An object of 32 bits (index << 8 | sub-index), such as the digital inputs, 60FDh, that this drive sends in TPDO2 at
-  // every SYNC; 0: none. Not for decoding here.
+  // A 32-bit object (index << 8 | sub-index) that this drive sends in TPDO2 at every SYNC, such as the digital inputs,
+  // 60FDh; 0: none. Not decoded here.
   std::uint32_t inputs_object = 0;
   SdoSequenceConfig sdo{};
-  std::int64_t nmt_timeout_ns = 2'000'000'000;  // for a change of NMT state to show in the drive's heartbeat
+  std::int64_t nmt_timeout_ns = 2'000'000'000;  // for a change of NMT state to show in the heartbeat
 
-  // The drives stop within this time of the controller's last word, whatever else they watch: its heartbeat comes three
+  // Makes the drives stop within this time of the controller's last frame. The controller's heartbeat is sent three
   // times as often.
   void stop_without_controller(double within_s) noexcept;
-  // 1016h:01, by which a drive watches the controller.
+  // 1016h:01, with which a drive watches the controller.
   [[nodiscard]] std::uint32_t consumer_heartbeat() const noexcept {
     return static_cast<std::uint32_t>(master_node) << 16 | master_heartbeat_timeout_ms;
   }
-  // 100Dh, of a drive that watches the controller by life guarding; 100Ch is the heartbeat's period.
+  // 100Dh, for a drive that watches the controller by life guarding; 100Ch is the heartbeat's period.
   [[nodiscard]] std::uint8_t life_time_factor() const noexcept {
     return static_cast<std::uint8_t>(std::clamp(master_heartbeat_timeout_ms / master_heartbeat_ms, 1, 255));
   }
   void validate() const;  // throws SetupError
 };
 
-// An object that depends on the period: what it is to be, and what it was.
+// The new and the old value of an object that depends on the period.
 struct PeriodStep {
   ObjectAddress object{};
   std::uint8_t bytes = 4;
   std::uint32_t value = 0, old_value = 0;
-  bool is_optional = false;  // left to the maker
+  bool is_optional = false;  // not every drive has it
 };
 using PeriodSteps = std::array<PeriodStep, 4>;
 
 class ServoDrive final : public CyclicDrive {
  public:
-  // Throws SetupError where the description or the settings can't be what a drive is given, by the profile or its EDS.
+  // Throws SetupError if description or settings are invalid by the profile or the drive's EDS.
   ServoDrive(const description::DriveDescription& drive, const DriveSettings& settings);
 
   // ---- set-up ----
-  // By the profile, and by the drive's EDS where it has one (eds_check.hpp).
+  // By the profile and, if the drive has one, its EDS (eds_check.hpp).
   [[nodiscard]] std::vector<SdoStep> configuration_steps() const;
-  // After configuration_steps() was answered: what was lost, by the drive itself. Not for the cycle.
+  // Adds the losses found by configuration_steps(). Not for the cycle.
   void note_losses(const std::vector<std::string>& losses);
-  // A transmit PDO that the drive doesn't take: true where that is for feedback which nothing depends on. It is left
-  // out from now on, and configuration_steps() are others.
+  // Leaves out optional feedback that the drive refused to map in a transmit PDO; then returns true, and
+  // configuration_steps() no longer has it.
   bool give_up_feedback(const SdoStep& failed, std::uint32_t abort_code);
-  // What the drive lacks, and what is lost by it, a line each; by its EDS, and once it has been configured by itself.
+  // Objects that the drive lacks, by its EDS and by its answers, and the effects; one line each.
   [[nodiscard]] std::vector<std::string> losses() const;
-  // What is left to write once it is in operational.
+  // Writes that must wait until the drive is operational.
   [[nodiscard]] std::vector<SdoStep> operation_steps() const;
-  // From one period to another, in the order in which they are written; of 60C2h the part comes first with which the
-  // period is the longer one until the other part follows. Both periods are such that a drive can hold them.
+  // Steps from one period to another, in the order of writing. First comes that part of 60C2h which makes the interim
+  // period the longer one. Precondition: 60C2h and 1006h can hold both periods.
   [[nodiscard]] PeriodSteps period_steps(std::int64_t from_ns, std::int64_t to_ns) const noexcept;
-  // What the master must receive from this node: TPDO1, EMCY, SDO answers, heartbeat.
+  // Identifiers that the master must receive from this node: TPDO1, EMCY, SDO answers, heartbeat.
   [[nodiscard]] std::array<std::uint32_t, 4> wanted_ids() const noexcept;
-  // All identifiers that the drive and the master use between them: those, RPDO1 and SDO requests.
+  // wanted_ids(), RPDO1 and SDO requests.
   [[nodiscard]] std::array<std::uint32_t, 6> used_ids() const noexcept;
   [[nodiscard]] std::uint8_t node() const noexcept { return description_.node; }
   [[nodiscard]] const description::DriveDescription& description() const noexcept override { return description_; }
   [[nodiscard]] const DriveSettings& settings() const noexcept { return settings_; }
   [[nodiscard]] const CountScale& scale() const noexcept { return scale_; }
-  // Watching for faults of the wire starts here, once the drive is in operational.
+  // Begins to watch for faults; the drive must be operational.
   void start_cycle(std::int64_t now_ns) noexcept;
 
   // ---- cycle ----
-  // A fault that the drive is found in when operation is first wanted (its last controller died, say) is reset on the
-  // way; any later one is raised as a fault, and only fault_reset leaves it.
+  // Resets a fault that is present when operation is first requested (its last controller died, say). A later fault is
+  // raised, and only fault_reset leaves it.
   void request(DriveGoal goal) noexcept override;
-  // A SYNC is going out: what was received before it is no longer fresh. Also notices a lost heartbeat.
+  // Call when a SYNC is sent: frames received before are no longer fresh. Also detects a lost heartbeat.
   void on_sync(std::int64_t now_ns) noexcept override;
-  bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;  // true when it was this drive's
-  // Takes a new target; false where none is taken: not following() yet, or fault target_out_of_range.
+  bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;  // true if the frame was this drive's
+  // Sets a new target. False if it isn't taken: not following() yet, or fault target_out_of_range.
   bool set_target_rad(double angle_rad) noexcept override;
-  // In torque mode, at the joint. False, and the torque stays as it was: fault target_out_of_range.
+  // In torque mode, at the joint. If out of range: false, keeps the old torque, fault target_out_of_range.
   bool set_target_torque_Nm(double torque_Nm) noexcept;
-  // The RPDO of this cycle; false while no position is known yet, and then nothing may be sent.
+  // The RPDO of this cycle; false until a position is known: then nothing may be sent.
   bool encode_rpdo(CanFrame& frame) noexcept override;
 
-  // Asks for its NMT state: a drive that watches the controller by life guarding wants that as often as a heartbeat
-  // comes. False: it doesn't.
+  // For a drive that watches the controller by life guarding: requests its NMT state, once per heartbeat period.
+  // Others: false.
   [[nodiscard]] bool guard_request(CanFrame& frame) const noexcept;
 
-  // ---- what is known of the drive ----
-  [[nodiscard]] bool fresh() const noexcept override { return fresh_; }  // a TPDO came since the last SYNC
-  [[nodiscard]] bool heard() const noexcept { return heard_; }           // a TPDO came ever
+  // ---- the drive's state ----
+  [[nodiscard]] bool fresh() const noexcept override { return fresh_; }  // a TPDO was received since the last SYNC
+  [[nodiscard]] bool heard() const noexcept { return heard_; }           // a TPDO was ever received
   [[nodiscard]] std::uint32_t cycles_without_tpdo() const noexcept override { return cycles_without_tpdo_; }
   [[nodiscard]] DriveState state() const noexcept override { return state_; }
   [[nodiscard]] DriveGoal goal() const noexcept { return goal_; }
   [[nodiscard]] bool following() const noexcept override { return following_; }  // takes targets
   [[nodiscard]] bool torque_mode() const noexcept { return mode_.torque; }
-  // 6071h and 6077h, thousandths of the rated torque; the latter as torque at the joint, too.
+  // 6071h and 6077h in thousandths of the rated torque; actual_torque_Nm() at the joint.
   [[nodiscard]] std::int16_t target_torque() const noexcept { return target_torque_; }
   [[nodiscard]] std::int16_t actual_torque() const noexcept { return actual_torque_; }  // 0 without torque feedback
   [[nodiscard]] double actual_torque_Nm() const noexcept { return actual_torque_ / torque_per_Nm_; }
-  // In torque mode, and of a drive that takes positions where the cell's `feedback` has 6077h.
+  // In torque mode, or if the cell's `feedback` has 6077h.
   [[nodiscard]] std::optional<double> torque_share() const noexcept override;
-  // Of a cell whose drive has `gear_torque`; a second encoder's is the stiffness times the windup.
+  // If the drive has `gear_torque` in the cell. From a second encoder: stiffness times windup.
   [[nodiscard]] std::optional<double> gear_torque_Nm() const noexcept override;
   [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
   [[nodiscard]] std::int32_t actual_counts() const noexcept override { return actual_counts_; }
@@ -163,7 +164,7 @@ class ServoDrive final : public CyclicDrive {
   }
   [[nodiscard]] const Emergency& latest_emergency() const noexcept { return emergency_; }
   [[nodiscard]] std::uint64_t emergencies() const noexcept { return emergencies_; }
-  [[nodiscard]] std::uint64_t warnings() const noexcept { return warnings_; }  // EMCYs that stop nothing
+  [[nodiscard]] std::uint64_t warnings() const noexcept { return warnings_; }  // EMCYs that are warnings
   [[nodiscard]] std::uint64_t repeated_tpdos() const noexcept { return repeated_tpdos_; }
   // State, fault and latest EMCY in words; not for the cycle.
   [[nodiscard]] std::string describe() const override;
@@ -182,7 +183,7 @@ class ServoDrive final : public CyclicDrive {
   void leave_out_what_eds_lacks();
   [[nodiscard]] bool is_gear_torque(const MappedObject& object) const noexcept;
   [[nodiscard]] std::vector<SdoStep> all_profile_steps() const;
-  [[nodiscard]] std::vector<SdoStep> profile_steps() const;  // without those that the cell has it skip
+  [[nodiscard]] std::vector<SdoStep> profile_steps() const;  // without those that the cell skips
   void note_skipped();
   bool decode_tpdo(const CanFrame& frame) noexcept;
   void judge_doubled() noexcept;
@@ -193,15 +194,15 @@ class ServoDrive final : public CyclicDrive {
 
   description::DriveDescription description_;
   DriveSettings settings_;
-  std::shared_ptr<const description::EdsFile> eds_;  // may be none
+  std::shared_ptr<const description::EdsFile> eds_;  // nullptr if the cell names no EDS
   CyclicMode mode_;
   std::uint8_t tpdo_bytes_, rpdo_bytes_;
-  bool torque_feedback_;                     // in TPDO1, behind the position
-  std::optional<std::uint8_t> torque_byte_;  // of 6077h among the feedback that nothing depends on
-  std::optional<std::uint8_t> mode_byte_;    // of 6061h among that feedback: it is watched
+  bool torque_feedback_;                     // in TPDO1, after the position
+  std::optional<std::uint8_t> torque_byte_;  // byte of 6077h in the optional feedback
+  std::optional<std::uint8_t> mode_byte_;    // byte of 6061h in that feedback: it is watched
   std::optional<std::uint8_t> gear_torque_byte_;
   std::vector<std::string> losses_;
-  std::string fixed_by_eds_;  // until the drive itself has been asked
+  std::string fixed_by_eds_;  // objects that the EDS has as read-only; cleared by note_losses()
   CountScale scale_;
   double torque_per_Nm_ = 1.0;  // signed
   HeartbeatConsumer heartbeat_;
@@ -213,14 +214,14 @@ class ServoDrive final : public CyclicDrive {
   std::int32_t actual_counts_ = 0;
   std::int32_t target_counts_ = 0;
   std::int16_t target_torque_ = 0, actual_torque_ = 0;
-  std::int16_t extra_torque_ = 0;  // at torque_byte_
+  std::int16_t extra_torque_ = 0;  // the value at torque_byte_
   std::int32_t gear_torque_ = 0;   // counts
   std::uint64_t boot_ups_at_start_ = 0;
   std::uint32_t cycles_without_tpdo_ = 0;
   int held_ = 0;  // SYNCs that latched a target equal to the actual position, in the state switched on
   bool held_pending_ = false;
   bool cycling_ = false;
-  bool old_fault_ = true;  // no state other than fault has been seen since operation was first wanted
+  bool old_fault_ = true;  // no state but fault has been seen since operation was first requested
   bool fresh_ = false;
   bool heard_ = false;
   bool following_ = false;
@@ -228,9 +229,9 @@ class ServoDrive final : public CyclicDrive {
   std::uint64_t emergencies_ = 0;
   std::uint64_t repeated_tpdos_ = 0;
   std::uint64_t warnings_ = 0;
-  std::uint32_t tpdos_in_cycle_ = 0, doubled_cycles_ = 0;  // the latter in a row, with more than one
-  std::int8_t shown_mode_ = 0;                             // at mode_byte_
-  // Operation was given up before the drive took targets: its statusword then, with bit 16 set; 0: no such thing.
+  std::uint32_t tpdos_in_cycle_ = 0, doubled_cycles_ = 0;  // doubled_cycles_: consecutive cycles with more than one
+  std::int8_t shown_mode_ = 0;                             // the value at mode_byte_
+  // Statusword (with bit 16 set) when enabling was abandoned before the drive took targets; else 0.
   std::uint32_t stuck_ = 0;
 };
 

@@ -15,7 +15,7 @@ struct Watched {
 };
 constexpr std::uint8_t watched_objects = 2;
 
-// In the order in which they are written: a missing controller trips more drives than a missing SYNC.
+// In the order of writing: a missing controller trips more drives than a missing SYNC.
 Watched watched_by(const ServoDrive& drive, std::uint8_t step) noexcept {
   if (step > 0) return {{0x1006, 0}, 4};
   const bool guards = drive.description().bring_up.stops_by == description::StopsBy::life_guarding;
@@ -23,11 +23,12 @@ Watched watched_by(const ServoDrive& drive, std::uint8_t step) noexcept {
 }
 
 constexpr std::int64_t ms = 1'000'000;
-// Most drives need two periods from ready to switch on (no power) to switch on disabled; one that stays is told then.
+// Most drives need two periods from ready to switch on (no power) to switch on disabled. A drive that stays gets its
+// requests after this time.
 constexpr std::int64_t patience_ns = 100 * ms;
-// Drives answer within some milliseconds; a lost frame isn't worth more.
+// Drives answer within some milliseconds; a lost frame isn't worth a longer wait.
 constexpr std::int64_t answer_timeout_ns = 50 * ms;
-// For all of them, whatever they do. Six drives on one bus take some 30 ms.
+// Limit for all drives. Six drives on one bus take some 30 ms.
 constexpr std::int64_t limit_ns = 300 * ms;
 
 }  // namespace
@@ -70,7 +71,7 @@ bool Goodbye::next_request(std::int64_t now_ns, std::size_t& bus, CanFrame& fram
   return false;
 }
 
-// A confirmation and an abort end a step alike.
+// A confirmation and an abort both end a step.
 bool Goodbye::on_frame(std::size_t bus, const CanFrame& frame) noexcept {
   if (frame.extended || frame.remote || frame.error) return false;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {

@@ -43,7 +43,7 @@ namespace {
 
 constexpr unsigned statusword_and_position = 16 + 32, actual_torque = 16;  // bits
 
-// The first byte of an object among the cell's `feedback`, which begins behind so many bits.
+// First byte of an object in the cell's `feedback`, which begins after `bits` bits.
 std::optional<std::uint8_t> feedback_byte(const description::DriveDescription& drive, std::uint32_t object,
                                           std::uint8_t wide, unsigned bits) noexcept {
   for (const description::DriveFeedback& more : drive.feedback) {

@@ -42,7 +42,7 @@ bool PeriodExchange::done() const noexcept {
   return !failed_ && std::none_of(nodes_.begin(), nodes_.end(), [](const Node& node) { return node.wanted; });
 }
 
-// The way back is the way there in the opposite order: a drive that has gone half of it has no new period in between.
+// The way back has the opposite order, so that a drive halfway has no further period in between.
 PeriodStep PeriodExchange::step_of(std::size_t drive) const noexcept {
   const PeriodSteps steps = drives_[drive].drive->period_steps(from_ns_, to_ns_);
   const std::size_t i = std::min<std::size_t>(nodes_[drive].step, steps.size() - 1);
@@ -73,7 +73,7 @@ bool PeriodExchange::next_request(std::int64_t now_ns, std::size_t& bus, CanFram
   return false;
 }
 
-// What is the same in both periods stays unwritten.
+// Skips objects that have the same value in both periods.
 void PeriodExchange::skip_unchanged(std::size_t drive) noexcept {
   Node& node = nodes_[drive];
   for (; node.step < PeriodSteps().size(); ++node.step) {
@@ -109,7 +109,7 @@ bool PeriodExchange::on_frame(std::size_t bus, const CanFrame& frame) noexcept {
   return false;
 }
 
-// What isn't an answer to the request is left: it is one that comes late.
+// Ignores an answer that doesn't match the request: it is a late one.
 void PeriodExchange::on_answer(std::size_t drive, const CanFrame& frame) noexcept {
   Node& node = nodes_[drive];
   const PeriodStep step = step_of(drive);
@@ -146,7 +146,7 @@ void PeriodExchange::on_cycle(std::int64_t now_ns) noexcept {
     Node& node = nodes_[i];
     if (node.waiting == Waiting::nothing || now_ns < node.deadline_ns) continue;
     node.waiting = Waiting::nothing;
-    node.written = false;  // it may be what was lost
+    node.written = false;  // the request may be lost
     node.read_next = back_;
     if (++node.attempt >= attempts) fail(i, sdo_abort::timed_out);
   }
@@ -154,7 +154,7 @@ void PeriodExchange::on_cycle(std::int64_t now_ns) noexcept {
 
 void PeriodExchange::archive(StateArchive& state) noexcept {
   state(from_ns_, to_ns_, back_, failed_, refusal_.drive, refusal_.index, refusal_.sub, refusal_.code);
-  // Read from a file it may be anything.
+  // A value read from a file may be invalid.
   constexpr std::int64_t longest_ns = 1'000'000'000;
   from_ns_ = std::clamp<std::int64_t>(from_ns_, 0, longest_ns);
   to_ns_ = std::clamp<std::int64_t>(to_ns_, 0, longest_ns);

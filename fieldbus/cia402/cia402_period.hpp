@@ -1,16 +1,16 @@
-// Tells CiA 402 drives another period while the cycle runs and they stand: 60C2h, 1006h and the receive PDO's timer.
+// Changes the period of CiA 402 drives while the cycle runs and the drives stand still: 60C2h, 1006h and the receive
+// PDO's timer.
 //
-// Each object is written by an expedited SDO download and read back (CiA 301, 7.2.4.3); one request at a time on each
-// bus, at most one per bus and cycle, so that a cycle's own frames are delayed by one frame at most. A drive that
-// hasn't an object that the standard leaves to the maker goes without, as at the start. What a drive refuses, doesn't
-// answer, or keeps at another value ends the exchange; take_back() then reads what those that were written to have, and
-// writes the old period where it isn't that.
+// Each object is written by an expedited SDO download and read back (CiA 301, 7.2.4.3), at most one request per bus and
+// cycle, which delays the cycle's frames by at most one frame. Missing optional objects are left out. The exchange
+// fails if a drive refuses, doesn't answer or keeps another value. take_back() then restores the old period in the
+// objects that were written.
 //
-// 60C2h is two objects, value and exponent, and between the two writes the drive has a period that nobody wants. Their
-// order is the one that makes it the longer one: SYNC is never slower than a drive expects, so its supervision keeps
-// still. For that the caller's cycle runs at the shorter one of both periods as long as the exchange does.
+// 60C2h consists of two objects, value and exponent, so between the two writes the drive has an interim period. The
+// order of the writes makes it the longer one: SYNC then never comes slower than the drive expects, and its supervision
+// doesn't trip. For that, the cycle must run at the shorter of both periods during the exchange.
 //
-// Made before the cycle; all else is for the cycle: it neither allocates, locks nor throws.
+// Construct before the cycle; the functions neither allocate, lock nor throw.
 #pragma once
 
 #include <array>
@@ -25,28 +25,27 @@
 
 namespace proxarm::fieldbus {
 
-// Why a drive's period isn't what it was to be.
 struct PeriodRefusal {
-  std::int32_t drive = -1;  // among the slots; −1: no drive has
-  std::uint16_t index = 0;  // the object
+  std::int32_t drive = -1;  // index of the slot; −1: no refusal
+  std::uint16_t index = 0;
   std::uint8_t sub = 0;
-  std::uint32_t code = 0;  // of the SDO abort; 05040000h: no answer; 0: it took the value but kept another
+  std::uint32_t code = 0;  // SDO abort code; 05040000h: no answer; 0: it accepted the value but kept another
 };
 
 class PeriodExchange {
  public:
   explicit PeriodExchange(std::span<const DriveSlot> drives);
 
-  // Begins; both periods are such that 60C2h and 1006h hold them.
+  // Begins. Precondition: 60C2h and 1006h can hold both periods.
   void tell(std::int64_t from_ns, std::int64_t to_ns) noexcept;
-  // Whatever has been told so far: those drives back to the old one. Not before tell().
+  // Returns the drives changed so far to the old period. Precondition: tell() was called.
   void take_back() noexcept;
 
-  // A request that is due now, to be sent by the caller; false: none (any more).
+  // The request to be sent now; false if none is due.
   [[nodiscard]] bool next_request(std::int64_t now_ns, std::size_t& bus, CanFrame& frame) noexcept;
-  // True when the frame was an SDO answer of one of the drives.
+  // True if the frame was an SDO answer of one of the drives.
   bool on_frame(std::size_t bus, const CanFrame& frame) noexcept;
-  // Notices answers that are overdue.
+  // Detects missing answers.
   void on_cycle(std::int64_t now_ns) noexcept;
 
   [[nodiscard]] bool failed() const noexcept { return failed_; }
@@ -55,14 +54,14 @@ class PeriodExchange {
   void archive(StateArchive& state) noexcept;
 
  private:
-  static constexpr std::uint8_t attempts = 2;  // a lost frame doesn't end it
+  static constexpr std::uint8_t attempts = 2;  // so that a lost frame doesn't end the exchange
 
   enum class Waiting : std::uint8_t { nothing, write, read };
   struct Node {
-    bool wanted = false;   // takes part
-    bool touched = false;  // was written to
+    bool wanted = false;
+    bool touched = false;
     Waiting waiting = Waiting::nothing;
-    bool written = false;  // the object of this step
+    bool written = false;  // the object of this step has been written
     bool read_next = false;
     std::uint8_t step = 0;
     std::uint8_t attempt = 0;
@@ -80,7 +79,7 @@ class PeriodExchange {
   std::vector<DriveSlot> drives_;
   std::vector<Node> nodes_;
   std::int64_t from_ns_ = 0, to_ns_ = 0;
-  bool back_ = false;  // from_ns_ is what is told
+  bool back_ = false;  // returning to from_ns_
   bool failed_ = false;
   PeriodRefusal refusal_;
 };

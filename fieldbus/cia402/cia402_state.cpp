@@ -24,19 +24,19 @@ struct TransitionRow {
 
 namespace cw = controlword;
 
-// What isn't listed is met by controlword 00 (disable voltage), which asks for nothing but standing still.
+// For all other combinations the controlword is 00 (disable voltage).
 constexpr TransitionRow transition_rows[] = {
     {DriveGoal::operation_enabled, DriveState::switch_on_disabled, {cw::shutdown, 2}},
     {DriveGoal::operation_enabled, DriveState::ready_to_switch_on, {cw::switch_on, 3}},
     {DriveGoal::operation_enabled, DriveState::switched_on, {cw::enable_operation, 4}},
     {DriveGoal::operation_enabled, DriveState::operation_enabled, {cw::enable_operation, -1}},
-    // Back through the stop's end (16 would restart into motion, which the standard doesn't recommend either).
+    // Leaves the stop by disabling voltage (16 would restart the motion, which the standard doesn't recommend either).
     {DriveGoal::operation_enabled, DriveState::quick_stop_active, {cw::disable_voltage, 12}},
 
     {DriveGoal::switched_off, DriveState::operation_enabled, {cw::shutdown, 8}},
     {DriveGoal::switched_off, DriveState::switched_on, {cw::shutdown, 6}},
     {DriveGoal::switched_off, DriveState::ready_to_switch_on, {cw::disable_voltage, 7}},
-    {DriveGoal::switched_off, DriveState::quick_stop_active, {cw::quick_stop, -1}},  // let it finish its ramp
+    {DriveGoal::switched_off, DriveState::quick_stop_active, {cw::quick_stop, -1}},  // until its ramp ends
 
     {DriveGoal::quick_stop, DriveState::operation_enabled, {cw::quick_stop, 11}},
     {DriveGoal::quick_stop, DriveState::quick_stop_active, {cw::quick_stop, -1}},
@@ -63,7 +63,7 @@ DriveState decode_state(std::uint16_t statusword) noexcept {
 ControlStep next_controlword(DriveState state, DriveGoal goal, std::uint16_t previous_controlword) noexcept {
   for (const TransitionRow& row : transition_rows) {
     if (row.goal != goal || row.from != state) continue;
-    // The reset acts on the rising edge of bit 7: let it fall first when it is still up.
+    // The reset acts on the rising edge of bit 7, so that bit must be low first.
     if (row.step.transition == 15 && (previous_controlword & cw::fault_reset) != 0) return {cw::disable_voltage, -1};
     return row.step;
   }

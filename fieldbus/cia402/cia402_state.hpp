@@ -1,5 +1,5 @@
-// The power state machine of a CiA 402 drive: which state its statusword (6041h) says it is in, and which controlword
-// (6040h) brings it one transition nearer to where it is wanted.
+// The power state machine of a CiA 402 drive: decodes the state from the statusword (6041h), and gives the controlword
+// (6040h) for the next transition towards a goal.
 //
 //            0,1                 2: 06          3: 07            4: 0F
 //   start ───────▶ switch on ──────────▶ ready to ────────▶ switched ────────▶ operation ──11: 02──▶ quick stop
@@ -15,22 +15,21 @@
 namespace proxarm::fieldbus {
 
 enum class DriveState : std::uint8_t {
-  not_ready_to_switch_on,  // self-test; leaves by itself
+  not_ready_to_switch_on,  // self-test; left automatically
   switch_on_disabled,
   ready_to_switch_on,
   switched_on,
   operation_enabled,
   quick_stop_active,
-  fault_reaction_active,  // stopping by itself
+  fault_reaction_active,  // the drive is stopping
   fault,
-  unknown,  // no row of the standard's table fits
+  unknown,  // not in the standard's table
 };
 
-// Where the master wants a drive to be.
 enum class DriveGoal : std::uint8_t {
-  none,               // controlword 00, whatever the state
-  operation_enabled,  // a fault is not reset on the way
-  switched_off,       // switch on disabled, after the drive's own deceleration (605Bh)
+  none,               // controlword 00 in any state
+  operation_enabled,  // faults are not reset
+  switched_off,       // switch on disabled, after the drive's deceleration (605Bh)
   quick_stop,         // stop on the quick-stop ramp (605Ah), then switch on disabled
   fault_reset,        // leave the state fault; otherwise as switched_off
 };
@@ -41,26 +40,26 @@ inline constexpr std::uint16_t quick_stop = 0x0002;
 inline constexpr std::uint16_t shutdown = 0x0006;
 inline constexpr std::uint16_t switch_on = 0x0007;
 inline constexpr std::uint16_t enable_operation = 0x000F;
-inline constexpr std::uint16_t fault_reset = 0x0080;  // acts on its rising edge
+inline constexpr std::uint16_t fault_reset = 0x0080;  // on the rising edge
 }  // namespace controlword
 
 namespace statusword {
 inline constexpr std::uint16_t fault = 1U << 3;
 inline constexpr std::uint16_t voltage_enabled = 1U << 4;
 inline constexpr std::uint16_t warning = 1U << 7;
-inline constexpr std::uint16_t remote = 1U << 9;  // 0: the drive doesn't obey the controlword
+inline constexpr std::uint16_t remote = 1U << 9;  // 0: the drive ignores the controlword
 inline constexpr std::uint16_t internal_limit_active = 1U << 11;
-inline constexpr std::uint16_t follows_command = 1U << 12;  // cyclic modes: the drive follows the target
+inline constexpr std::uint16_t follows_command = 1U << 12;  // cyclic modes: the drive follows targets
 inline constexpr std::uint16_t following_error = 1U << 13;  // cyclic modes
 }  // namespace statusword
 
 struct ControlStep {
   std::uint16_t controlword = 0;
-  int transition = -1;  // the standard's number of the transition it asks for; −1: none, the state is held
+  int transition = -1;  // the standard's number of the requested transition; −1: keep the state
 };
 
 [[nodiscard]] DriveState decode_state(std::uint16_t statusword) noexcept;
-// `previous_controlword`: the one sent last, since a fault is reset by a rising edge.
+// `previous_controlword`: the last one sent, since a fault is reset by a rising edge.
 [[nodiscard]] ControlStep next_controlword(DriveState state, DriveGoal goal,
                                            std::uint16_t previous_controlword) noexcept;
 [[nodiscard]] std::string_view to_string(DriveState state) noexcept;

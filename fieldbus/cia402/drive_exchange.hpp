@@ -1,5 +1,5 @@
-// What the set-up of drives is made of: SDO exchanges with several of them side by side, and NMT commands that show in
-// their heartbeats. Blocks; not for the cycle.
+// Building blocks for the set-up of drives: SDO exchanges with several drives side by side, and NMT commands confirmed
+// by heartbeats. Blocks; not for the cycle.
 #pragma once
 
 #include <cstdint>
@@ -14,26 +14,25 @@ namespace proxarm::fieldbus {
 
 using StepsOf = std::function<std::vector<SdoStep>(const ServoDrive&)>;
 
-// Each drive's own frames to it; `other` (may be empty) gets the rest. The drives must outlive it.
+// A handler that gives each drive its frames, and `other` (may be empty) the rest. The drives must outlive it.
 [[nodiscard]] FrameHandler handed_to(std::span<const DriveSlot> drives, const FrameHandler& other = {});
 
-// An exchange with each drive, to its end, well or not: by the order of the drives. Frames that aren't SDO answers go
-// to `handler`. `boot_ups`: of each drive when it first answered; one that restarts later forgets it all.
+// Runs an exchange with each drive to its end, failed or not; results in the order of the drives. Frames other than SDO
+// answers go to `handler`. `boot_ups` gets each drive's count at its first answer, to detect a later restart.
 [[nodiscard]] std::vector<SdoSequence> exchange(CanNetwork& network, std::span<const DriveSlot> drives,
                                                 const FrameHandler& handler, const StepsOf& steps_of,
                                                 std::vector<std::uint64_t>* boot_ups = nullptr);
 
-// Throws SetupError where it can't be sent.
+// Throws SetupError if the command can't be sent.
 void send_nmt(CanNetwork& network, std::span<const DriveSlot> drives, NmtCommand command, const char* name);
 
-// Of the drive that is given the longest time for a change of its NMT state to show.
 [[nodiscard]] std::int64_t longest_nmt_timeout_ns(std::span<const DriveSlot> drives) noexcept;
 
-// True as soon as all of them are in this state, by their heartbeats; false after `timeout_ns`.
+// True as soon as the heartbeats of all drives show this state; false after `timeout_ns`.
 [[nodiscard]] bool wait_for_state(CanNetwork& network, std::span<const DriveSlot> drives, const FrameHandler& handler,
                                   NmtState state, std::int64_t timeout_ns);
 
-// The refusal of a drive that isn't in the state which is wanted of it; `more` goes behind the state that is found.
+// The error for a drive that isn't in the wanted state; `more` is appended to the state found.
 [[nodiscard]] description::SetupError not_in_state(const ServoDrive& drive, NmtState wanted, const std::string& more,
                                                    const char* advice);
 

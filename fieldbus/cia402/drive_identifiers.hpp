@@ -1,4 +1,4 @@
-// Identifiers that a drive has on its bus by its node, of CiA 301's predefined connections: those that are used here.
+// The identifiers used of a drive, by its node, from CiA 301's predefined connection set.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace proxarm::fieldbus {
 
-// TPDO1, EMCY, SDO's answer and heartbeat, which it sends, then RPDO1 and SDO's request.
+// Sent by the drive: TPDO1, EMCY, SDO answer, heartbeat; sent by the master: RPDO1, SDO request.
 inline std::array<std::uint32_t, 6> drive_identifiers(std::uint8_t node) noexcept {
   return {pdo_id(PdoDirection::transmit, 1, node),
           emcy_id(node),

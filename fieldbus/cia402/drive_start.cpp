@@ -10,14 +10,13 @@ namespace {
 
 using Slots = std::span<const DriveSlot>;
 
-// A drive says its state every 50 ms (1017h): that many heartbeats show that it isn't started, or is.
+// Drives report their state every 50 ms (1017h); these times contain enough heartbeats to tell whether a drive started.
 constexpr std::int64_t looked_into_after_ns = 300'000'000, shows_within_ns = 200'000'000;
-constexpr std::int64_t signs_of_life_ns = 100'000'000;  // five of the controller's heartbeats, before NMT start
+constexpr std::int64_t signs_of_life_ns = 100'000'000;  // of the controller: five heartbeats before NMT start
 
 constexpr const char* how_to_start =
     "it took its configuration but doesn't start: look at its display or its error list (1003h)";
 
-// A drive that isn't started, and why.
 struct HeldBack {
   DriveSlot slot;
   Emergency error;
@@ -37,7 +36,7 @@ std::string name_of(const DriveSlot& slot) {
   return "drive of " + drive.joint + " (bus " + drive.bus + ", node " + std::to_string(drive.node) + ")";
 }
 
-// Some stacks enter in 1003h:01 that an error went (code 0) while another one still stands.
+// Some stacks log the end of an error (code 0) in 1003h:01 while another error persists.
 std::string text_of(const Emergency& error) {
   if (error.code != 0) return describe(error);
   return "an error (1001h:00 is " + hex_text(error.error_register, 2) + ")";
@@ -49,7 +48,7 @@ std::vector<DriveSlot> slots_of(const std::vector<HeldBack>& held) {
   return slots;
 }
 
-// Those whose error register isn't 0.
+// Drives whose error register isn't 0.
 std::vector<HeldBack> held_back(const Start& start, Slots drives) {
   std::vector<DriveSlot> waiting;
   std::copy_if(drives.begin(), drives.end(), std::back_inserter(waiting), std::not_fn(is_started));
@@ -74,7 +73,7 @@ void start_anew(const Start& start, Slots drives) {
   (void)wait_for_state(start.network, drives, start.handler, NmtState::operational, shows_within_ns);
 }
 
-// ---- The means. What a drive doesn't take of them is no mistake: the next one follows.
+// ---- Remedies. A drive that refuses a step isn't an error: the next remedy follows.
 
 void reset_fault(const Start& start, Slots drives) {
   (void)exchange(start.network, drives, start.handler, [](const ServoDrive& drive) {
@@ -85,7 +84,8 @@ void reset_fault(const Start& start, Slots drives) {
   start_anew(start, drives);
 }
 
-// SYNC and the controller's heartbeat on the drives' buses, until all are in operational after NMT start, or too late.
+// Sends SYNC and the controller's heartbeat on the drives' buses until all are operational after NMT start, or time is
+// up.
 void start_under_signs_of_life(const Start& start, Slots drives) {
   const DriveSettings& settings = drives.front().drive->settings();
   HeartbeatProducer heartbeat(settings.master_node, std::int64_t{settings.master_heartbeat_ms} * 1'000'000);
@@ -158,7 +158,7 @@ constexpr Means means[] = {{"a fault reset", reset_fault},
                            {"SYNC and heartbeat before NMT start", show_life},
                            {"NMT reset communication (82h)", reset_communication}};
 
-// Returns what was tried, for the refusal.
+// Returns the remedies tried, for the error message.
 std::string help(const Start& start, std::vector<HeldBack>& held) {
   std::string tried;
   for (const HeldBack& drive : held) {

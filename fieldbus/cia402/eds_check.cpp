@@ -74,16 +74,16 @@ void check_step(const EdsFile& eds, const SdoStep& step) {
   }
 }
 
-// Of an object that can't be written: its default, where the file says it.
+// Default of an object that can't be written, if the file has one.
 std::optional<std::uint32_t> fixed_value(const EdsObject& object, std::uint8_t node) noexcept {
   if (object.default_offset) return *object.default_offset + node;
   return object.default_value;
 }
 
-// What the drive is found to have there must be one of the values that fit.
+// Throws unless the fixed value is one of the permitted ones.
 void require_found(const EdsFile& eds, const SdoStep& step, std::uint8_t node) {
   const auto value = fixed_value(*eds.find(number_of(step.object)), node);
-  if (!value) return;  // the drive itself will be asked
+  if (!value) return;  // known only when the drive is asked
   const auto is = [&](std::uint32_t fits) { return ((*value ^ fits) & step.mask) == 0; };
   if (is(step.value) || std::any_of(step.as_found.begin(), step.as_found.end(), is)) return;
   std::string expected;
@@ -94,7 +94,7 @@ void require_found(const EdsFile& eds, const SdoStep& step, std::uint8_t node) {
          expected + ": " + step.name);
 }
 
-// A loss by an optional object that isn't there, or can't be written; empty: none.
+// The effect of a missing or read-only optional object; empty: none.
 std::string loss_of(const EdsObject* there, const SdoStep& step, std::uint8_t node) {
   if (*step.lost == '\0') return "";
   if (there == nullptr) return "no " + to_string(step.object) + ": " + step.lost;
@@ -157,8 +157,8 @@ std::vector<SdoStep> steps_by_eds(const std::vector<SdoStep>& steps, const EdsFi
       step.value = *value;
       step.advice = "is another device set to this node, or is this another device's EDS?";
     }
-    // The upper half of the revision changes with what the device does on the bus, the lower half with its firmware
-    // (CiA 301, 7.5.2.19). A file that states none has 0 there.
+    // The upper half of the revision changes with the CANopen behaviour, the lower half with the firmware (CiA 301,
+    // 7.5.2.19). A file without a revision has 0.
     if (const std::uint32_t major = eds.revision.value_or(0) & 0xFFFF0000U;
         major != 0 && step.object == ObjectAddress{0x1018, 3}) {
       step.kind = SdoStep::Kind::expect;
@@ -168,7 +168,7 @@ std::vector<SdoStep> steps_by_eds(const std::vector<SdoStep>& steps, const EdsFi
     }
     checked.push_back(step);
   }
-  constexpr std::uint32_t first_of_device = 0x200000;  // those of the communication are the master's to set
+  constexpr std::uint32_t first_of_device = 0x200000;  // lower ones are communication objects, which the master sets
   for (const auto& [address, object] : eds.objects) {
     if (!object.value || !object.writable || !object.readable || object.bits < 8 || object.bits > 32) continue;
     if (address < first_of_device || is_set_by(checked, address)) continue;

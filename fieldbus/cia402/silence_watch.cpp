@@ -13,7 +13,7 @@ constexpr std::uint8_t on_change = 255;
 
 std::vector<SdoStep> words_steps(const ServoDrive& drive) {
   std::vector<SdoStep> steps;
-  // A node that produces heartbeats doesn't guard its life (CiA 301).
+  // CiA 301 doesn't allow heartbeat and life guarding together.
   if (drive.description().bring_up.stops_by != description::StopsBy::life_guarding) {
     steps.push_back(sdo_write({0x1017, 0}, 2, heartbeat_every_ms, "producer heartbeat time"));
   }
@@ -57,8 +57,7 @@ void SilenceWatch::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcep
   if (Emergency emergency; decode_emcy(frame, time_ns, node_, emergency)) {
     if (emergency.code == 0) return;
     if (emcy_ == 0) emcy_ = emergency.code;
-    // What a drive warns of and carries on with isn't its stop (8100h of a stack that misses SYNC): its state says
-    // more.
+    // 8100h (a stack that misses SYNC) is no stop: the drive goes on, and its state tells when it stops.
     constexpr std::uint16_t communication = 0x8100;
     if (emergency.code != communication) react(time_ns);
   } else if (frame.id == heartbeat_id(node_) && frame.length == 1) {

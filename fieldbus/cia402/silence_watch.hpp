@@ -1,8 +1,8 @@
-// What a drive does when its controller falls silent, as a listener on the bus sees it.
+// Observes on the bus what a drive does when its controller falls silent.
 //
-// Before the silence the drive is asked to say more than in a session: its heartbeat, and where it can a third transmit
-// PDO with its statusword, on a change and every 5 ms, since there is no SYNC any more that would bring the first. A
-// drive that takes neither is told by its EMCY alone.
+// Before the silence, the drive is asked to report more than in a session: a heartbeat and, if possible, its statusword
+// in TPDO3, on a change and every 5 ms, since TPDO1 ends with SYNC. A drive that refuses both is observed by its EMCY
+// alone.
 #pragma once
 
 #include <cstdint>
@@ -14,25 +14,25 @@
 
 namespace proxarm::fieldbus {
 
-// What the drives are asked to say in the silence; what one doesn't take is left out. Until the next set-up.
+// Configures the drives' reports for the silence, until the next set-up. Refusals are ignored.
 void ask_for_words(CanNetwork& network, std::span<const DriveSlot> drives);
 
-// 6041h of each drive, read by SDO: also one that isn't in operational answers. Unknown: no answer.
+// Reads 6041h of each drive by SDO, which also works outside of operational. Unknown: no answer.
 [[nodiscard]] std::vector<DriveState> ask_for_states(CanNetwork& network, std::span<const DriveSlot> drives);
 
 class SilenceWatch {
  public:
   explicit SilenceWatch(const ServoDrive& drive) noexcept : node_(drive.node()) {}
 
-  // The identifier that is new on the bus.
+  // Identifier of the additional PDO.
   [[nodiscard]] std::uint32_t wanted_id() const noexcept;
-  // Frames from the silence's beginning on, whoever's they are; noexcept, no heap.
+  // For all frames from the beginning of the silence on. noexcept, no heap.
   void on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept;
 
-  // The first sign that it doesn't carry on: EMCY, another state than operation enabled, or another NMT state.
+  // True after the first sign that the drive stops: EMCY, another state than operation enabled, or another NMT state.
   [[nodiscard]] bool has_reacted() const noexcept { return reacted_ns_ >= 0; }
   [[nodiscard]] std::int64_t reacted_ns() const noexcept { return reacted_ns_; }
-  // Its statusword said that it has no power any more; −1: it didn't say so.
+  // When its statusword first reported that it has no power; −1: never.
   [[nodiscard]] std::int64_t off_ns() const noexcept { return off_ns_; }
   // "EMCY 8130h heartbeat error, NMT pre-operational".
   [[nodiscard]] std::string signs() const;

@@ -1,7 +1,7 @@
-// A Modbus master on one line: a request goes out, its answer comes back or doesn't.
+// A Modbus master on one line: sends a request and waits for its answer.
 //
-// Through libmodbus: a TCP connection or a serial line in RTU mode. Blocks for at most the response timeout (and, over
-// TCP after a failure, once more for a new connection); one thread uses it.
+// Uses libmodbus, over a TCP connection or a serial line in RTU mode. Each call blocks for at most the response timeout
+// and, over TCP after a failure, as long again for a new connection. For one thread.
 #pragma once
 
 #include <cstdint>
@@ -25,10 +25,10 @@ class ModbusClient {
   ModbusResult write(std::uint8_t unit, std::uint16_t at, std::span<const std::uint16_t> values) noexcept;
   ModbusResult read_write(std::uint8_t unit, std::uint16_t read_at, std::span<std::uint16_t> read_values,
                           std::uint16_t at, std::span<const std::uint16_t> values) noexcept;
-  [[nodiscard]] int exception() const noexcept { return exception_; }  // of the last result that was one
+  [[nodiscard]] int exception() const noexcept { return exception_; }  // code of the last result `exception`
 
  protected:
-  // Sends unit and PDU, takes the answer's. The result is ok as soon as an answer is complete.
+  // Sends unit and PDU and receives those of the answer. Returns ok as soon as an answer is complete.
   virtual ModbusResult transact(const ModbusMessage& request, ModbusMessage& answer) noexcept = 0;
 
  private:
@@ -37,8 +37,8 @@ class ModbusClient {
   int exception_ = 0;
 };
 
-// Is the peer a process of this very machine, so that nothing real can move: a loopback address, a pseudo-terminal? A
-// tunnel from one of those to a real drive can't be seen.
+// True if the peer is a process of this machine (loopback address or pseudo-terminal), so that no real axis can move. A
+// tunnel from such a peer to a real drive can't be detected.
 [[nodiscard]] bool is_on_this_machine(const description::ModbusLineDescription& line);
 
 // "10.0.0.5, port 502" or "/dev/ttyUSB0".
@@ -46,10 +46,10 @@ class ModbusClient {
 
 enum class ModbusPeers {
   on_this_machine,
-  any,  // somebody has said that real axes may move
+  any,  // the user has confirmed that real axes may move
 };
 
-// Opens the line. Throws SetupError: nobody there, no such device, or a peer that isn't allowed.
+// Opens the line. Throws SetupError if nothing answers, the device doesn't exist or the peer isn't allowed.
 [[nodiscard]] std::unique_ptr<ModbusClient> open_modbus(const description::ModbusLineDescription& line,
                                                         double response_timeout_s,
                                                         ModbusPeers peers = ModbusPeers::on_this_machine);

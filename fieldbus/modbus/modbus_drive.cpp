@@ -66,7 +66,7 @@ bool ModbusDrive::has_control() const noexcept {
                      [](const ModbusValue& v) { return v.signal == ModbusValue::Signal::control; });
 }
 
-// ---- the worker's ---------------------------------------------------------------------------------------------------
+// ---- worker thread --------------------------------------------------------------------------------------------------
 
 double ModbusDrive::resampled(const Setpoint& setpoint, std::int64_t now_ns, std::int64_t exchange_ns) const noexcept {
   if (!setpoint.follow) return answer_.position_counts;
@@ -118,7 +118,7 @@ std::size_t ModbusDrive::encode(const Setpoint& setpoint, std::int64_t now_ns, s
   return at;
 }
 
-// The feedback, and on the way the command if there is one.
+// Reads the feedback and, if there is a command, writes it in the same exchange.
 ModbusResult ModbusDrive::talk(ModbusClient& client, std::span<const std::uint16_t> command) noexcept {
   const std::uint8_t unit = description_.node;
   const std::span<std::uint16_t> values(read_.data(), static_cast<std::size_t>(registers_.feedback_count));
@@ -153,7 +153,7 @@ bool ModbusDrive::exchange(ModbusClient& client, std::int64_t now_ns, std::int64
   if (cycling_ && now_ns - setpoint_.time_ns > stale_ns_) return false;
   std::array<std::uint16_t, modbus_most_written> command{};
   std::size_t count = 0;
-  // A drive that knows no control word moves as soon as it is written to.
+  // A drive without a control word moves as soon as it is written to.
   const bool writes = cycling_ && (has_control() || setpoint_.follow);
   if (writes) count = encode(setpoint_, now_ns, exchange_ns, command);
   const ModbusResult result = talk(client, {command.data(), count});
@@ -162,13 +162,13 @@ bool ModbusDrive::exchange(ModbusClient& client, std::int64_t now_ns, std::int64
   return true;
 }
 
-// A single answer that is late or spoilt is noise on the line, and a gateway that is busy (exception 6) asks to be
-// asked again; another exception, a closed connection or another unit ends it at once.
+// A single late or corrupted answer is noise on the line, and a busy gateway (exception 6) asks for a repetition. Any
+// other exception, a closed connection or an answer of another unit is a fault at once.
 void ModbusDrive::note(ModbusResult result, int exception, std::int64_t now_ns) noexcept {
   if (result == ModbusResult::ok) {
     const double interval_s = 1e-9 * static_cast<double>(now_ns - last_answer_ns_);
     if (answered_ && interval_s > 0.0) {
-      constexpr double share = 1.0 / 16.0;  // of the newest interval in the mean
+      constexpr double share = 1.0 / 16.0;  // weight of the newest interval in the mean
       const double mean_s = answer_.rate_Hz > 0.0 ? 1.0 / answer_.rate_Hz : interval_s;
       answer_.rate_Hz = 1.0 / (mean_s + share * (interval_s - mean_s));
     }
@@ -189,7 +189,7 @@ void ModbusDrive::note(ModbusResult result, int exception, std::int64_t now_ns) 
 }
 
 bool ModbusDrive::in_range(std::int32_t counts) const noexcept {
-  constexpr double beyond = 0.05;  // of the range: a joint may stand a little out of it
+  constexpr double beyond = 0.05;  // tolerance, as a share of the range
   const double more = beyond * (high_counts_ - low_counts_);
   return counts >= low_counts_ - more && counts <= high_counts_ + more;
 }
@@ -228,7 +228,7 @@ void ModbusDrive::start_up(ModbusClient& client, std::int64_t now_ns) {
                       .expected = "an answer",
                       .advice = "compare unit, baud rate and registers with " + registers_.file.string()});
   };
-  // A gateway that is busy is asked again.
+  // Repeats the request while the gateway is busy.
   const auto asked = [&client](const auto& request) {
     ModbusResult result = request();
     for (int again = 0; again < 10 && result == ModbusResult::exception && client.exception() == modbus_busy; ++again) {
@@ -267,7 +267,7 @@ void ModbusDrive::start_up(ModbusClient& client, std::int64_t now_ns) {
   sent_counts_ = answer_.position_counts;
 }
 
-// ---- the cycle's ----------------------------------------------------------------------------------------------------
+// ---- cycle thread ---------------------------------------------------------------------------------------------------
 
 void ModbusDrive::raise(DriveFault fault) noexcept {
   if (fault_ == DriveFault::none) fault_ = fault;

@@ -1,15 +1,16 @@
-// One drive on a Modbus line: what the cycle sees of it, and what the line's worker sends to it and makes of its
-// answers.
+// One drive on a Modbus line: its interface to the cycle, and the worker thread's part, which sends commands and
+// evaluates the answers.
 //
-// The cycle runs at its own period T, the line at P, several times as long and without any relation to it. The worker
-// resamples: setpoint k was meant for t_k + 2T (when a drive on CAN would be there), and what is sent at t is reached
-// one exchange later, so
+// The cycle runs with period T. The line's exchanges have period P, several times T and not synchronised with the
+// cycle. The worker resamples: setpoint k was meant for t_k + 2T (when a drive on CAN would reach it), and a command
+// sent at t is reached one exchange later, so
 //   counts = target + v (t + P − (t_k + 2T)),  v = (target(k) − target(k−1))/T,
-// extrapolated by two exchanges at most and kept in the joint's range. The speed that goes with it,
-// |counts − last counts|/P, makes the drive arrive when the next one comes, neither before nor late.
+// extrapolated by at most two exchanges and clamped to the joint's range. The commanded speed |counts − last counts|/P
+// lets the drive arrive just when the next command comes.
 //
-// A setpoint older than stale_after_s means that the cycle is gone: nothing is sent any more, and the drive stops by
-// its own communication timeout. Two threads: the cycle's, which uses the functions of CyclicDrive, and the worker's.
+// If the setpoint is older than stale_after_s, the cycle has stopped: the worker sends nothing more, and the drive
+// stops by its communication timeout. Two threads: the cycle's, which uses the functions of CyclicDrive, and the
+// worker's.
 #pragma once
 
 #include <array>
@@ -26,23 +27,23 @@ namespace proxarm::fieldbus {
 
 class ModbusDrive final : public CyclicDrive {
  public:
-  // `period_ns`: of the cycle. Throws SetupError where the cell's drive can't be what a register holds.
+  // `period_ns`: the cycle's. Throws SetupError if the drive's values don't fit into its registers.
   ModbusDrive(const description::DriveDescription& drive, const description::ModbusDriveDescription& registers,
               std::int64_t period_ns);
 
-  // ---- the worker's ----
-  // One exchange, begun at now_ns, the line coming round to this drive every exchange_ns. False: it had nothing to
-  // send, since the cycle is gone.
+  // ---- worker thread ----
+  // One exchange, begun at now_ns; exchange_ns is the time between two exchanges with this drive. False if nothing was
+  // sent because the cycle has stopped.
   bool exchange(ModbusClient& client, std::int64_t now_ns, std::int64_t exchange_ns) noexcept;
-  // Before the cycle: settings written and read back, position read. Throws SetupError, also where that position is out
-  // of the joint's range and would be in it with the words in the other order.
+  // Before the cycle: writes the settings and reads them back, reads the position. Throws SetupError, also if that
+  // position is out of the joint's range but would be within it in the other word order.
   void start_up(ModbusClient& client, std::int64_t now_ns);
-  // Whether that position shows that the file's word order is the drive's: in the other one it would be out of range. A
-  // position whose words are equal, such as 0, shows nothing; no later one would, since what is sent and what is read
-  // would both be the wrong way round.
+  // True if the position read at start proves that the file's word order is the drive's: in the other order it would be
+  // out of range. A position with two equal words, such as 0, proves nothing. Later positions can't prove it either:
+  // written and read values would both be swapped.
   [[nodiscard]] bool word_order_shown() const noexcept { return word_order_shown_; }
 
-  // ---- the cycle's ----
+  // ---- cycle thread ----
   [[nodiscard]] const description::DriveDescription& description() const noexcept override { return description_; }
   [[nodiscard]] const description::ModbusDriveDescription& registers() const noexcept { return registers_; }
   void request(DriveGoal goal) noexcept override { goal_ = goal; }
@@ -52,7 +53,7 @@ class ModbusDrive final : public CyclicDrive {
   bool encode_rpdo(CanFrame&) noexcept override { return false; }
 
   [[nodiscard]] bool fresh() const noexcept override { return fresh_; }
-  // Always 0: a drive that is silent for stale_after_s has the fault modbus_timeout.
+  // Always 0: a drive that is silent for stale_after_s has the fault modbus_timeout instead.
   [[nodiscard]] std::uint32_t cycles_without_tpdo() const noexcept override { return 0; }
   [[nodiscard]] double feedback_period_s() const noexcept override {
     return feedback_.rate_Hz > 0.0 ? 1.0 / feedback_.rate_Hz : registers_.stale_after_s;
@@ -70,7 +71,7 @@ class ModbusDrive final : public CyclicDrive {
     state(feedback_, goal_, state_, fault_, now_ns_, target_counts_, previous_target_, fresh_, following_);
   }
   void archive_input(StateArchive& state) noexcept override;
-  // Mean over the last exchanges that were answered, 1/s; 0: none yet.
+  // Mean over the last answered exchanges, 1/s; 0 before the first.
   [[nodiscard]] double achieved_rate_Hz() const noexcept { return feedback_.rate_Hz; }
 
  private:
@@ -79,8 +80,8 @@ class ModbusDrive final : public CyclicDrive {
     std::int64_t time_ns = 0;  // t_k
     double counts = 0.0;
     double counts_per_s = 0.0;
-    bool drive_it = false;  // the power stage is wanted
-    bool follow = false;    // go to `counts`; else stay where it is
+    bool drive_it = false;  // the power stage shall be on
+    bool follow = false;    // go to `counts`; false: stay at the present position
   };
   // From the worker to the cycle.
   struct Feedback {
@@ -88,7 +89,7 @@ class ModbusDrive final : public CyclicDrive {
     std::int32_t position_counts = 0;
     std::uint32_t status = 0;
     DriveFault fault = DriveFault::none;
-    DriveFault noise = DriveFault::none;  // what is wrong with the latest answer, while that is tolerated
+    DriveFault noise = DriveFault::none;  // defect of the latest answer while it is still tolerated
     int exception = 0;
     double rate_Hz = 0.0;
   };
@@ -116,7 +117,7 @@ class ModbusDrive final : public CyclicDrive {
   TripleBuffer<Setpoint> setpoints_;
   TripleBuffer<Feedback> feedbacks_;
 
-  // The worker's
+  // Used by the worker thread.
   Setpoint setpoint_;
   Feedback answer_;
   std::array<std::uint16_t, modbus_most_read> read_{};
@@ -125,7 +126,7 @@ class ModbusDrive final : public CyclicDrive {
   std::int64_t last_answer_ns_ = 0;
   int exchanges_since_status_ = 0;
 
-  // The cycle's
+  // Used by the cycle thread.
   Feedback feedback_;
   DriveGoal goal_ = DriveGoal::none;
   DriveState state_ = DriveState::unknown;

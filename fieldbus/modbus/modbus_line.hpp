@@ -1,8 +1,8 @@
-// A Modbus line's worker: exchanges with each of its drives in turn, at the rate that they ask for or as fast as the
-// line answers.
+// The worker of a Modbus line: exchanges with each of its drives in turn, at the rate they ask for or as fast as the
+// line allows.
 //
-// On a real line run() in a thread of its own. In a simulation whoever owns the virtual clock calls step() when it
-// says.
+// On a real line, run() has its own thread. In simulation, the owner of the virtual clock calls step() at the times
+// that step() returns.
 #pragma once
 
 #include <atomic>
@@ -17,19 +17,19 @@
 
 namespace proxarm::fieldbus {
 
-// Time on the wire of one exchange over a serial line: request and answer, 11 bits a character (10 without parity and
-// with one stop bit), and after each the silence of 3.5 characters, at least 1.75 ms above 19,200 baud.
+// Time on the wire of one exchange over a serial line, in s: request and answer, 11 bits per character (10 without
+// parity and with one stop bit), and after each a silence of 3.5 characters, at least 1.75 ms above 19,200 baud.
 [[nodiscard]] double modbus_rtu_exchange_s(const description::ModbusDriveDescription& drive,
                                            const description::ModbusLineDescription& line) noexcept;
-// The same of `registers` that are read by function 3.
+// The same for reading `registers` with function 3.
 [[nodiscard]] double modbus_rtu_read_s(int registers, const description::ModbusLineDescription& line) noexcept;
-// Exchanges a second with each of `drives` units that can be expected: the drive's own wish, or what the line carries.
+// Expected exchanges per second with each of `drives` units: the rate the drive asks for, or what the line can carry.
 [[nodiscard]] double modbus_expected_rate_Hz(const description::ModbusDriveDescription& drive,
                                              const description::ModbusLineDescription& line, int drives) noexcept;
 
 class ModbusLine {
  public:
-  // Drives and sensor (null: none on this line) must outlive the line. Line and client are opened already.
+  // Drives and sensor (null if the line has none) must outlive the line. Line and client are already open.
   ModbusLine(const description::ModbusLineDescription& line, std::unique_ptr<ModbusClient> client,
              std::vector<ModbusDrive*> drives, ModbusSensor* sensor = nullptr);
   ModbusLine(const ModbusLine&) = delete;
@@ -39,13 +39,13 @@ class ModbusLine {
   [[nodiscard]] const description::ModbusLineDescription& description() const noexcept { return line_; }
   [[nodiscard]] const std::vector<ModbusDrive*>& drives() const noexcept { return drives_; }
 
-  // Settings written and read back, positions read. Throws SetupError.
+  // Writes the settings and reads them back, reads the positions. Throws SetupError.
   void start_up(std::int64_t now_ns);
-  // What an exchange takes on the wire, at most.
+  // Longest time of an exchange on the wire, s.
   [[nodiscard]] double exchange_s() const noexcept;
-  // One exchange with the drive or sensor whose turn it is; returns when the next is due.
+  // Exchanges with the drive or sensor whose turn it is; returns the time of the next exchange.
   std::int64_t step(std::int64_t now_ns) noexcept;
-  // The worker: step() on CLOCK_MONOTONIC until stop().
+  // Starts the worker thread: step() on CLOCK_MONOTONIC until stop().
   void start();
   void stop() noexcept;
 
@@ -56,7 +56,7 @@ class ModbusLine {
   std::unique_ptr<ModbusClient> client_;
   std::vector<ModbusDrive*> drives_;
   ModbusSensor* sensor_;
-  std::int64_t interval_ns_;  // between exchanges with one drive
+  std::int64_t interval_ns_;  // between exchanges with the same drive
   std::int64_t next_ns_ = 0;
   std::size_t turn_ = 0;
   std::atomic<bool> stop_{false};

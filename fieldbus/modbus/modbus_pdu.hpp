@@ -1,5 +1,5 @@
-// Modbus requests and answers as bytes, from the unit to the last of the PDU, without what TCP (MBAP header) or RTU
-// (CRC) put around it. MODBUS Application Protocol Specification V1.1b3, sections 6.3, 6.12 and 6.17; numbers
+// Modbus requests and answers as bytes, from the unit to the end of the PDU, without the TCP header (MBAP) or the RTU
+// checksum (CRC). Source: MODBUS Application Protocol Specification V1.1b3, sections 6.3, 6.12 and 6.17. Numbers are
 // big-endian.
 //
 //   03 read holding registers            unit 03 at(2) count(2)
@@ -22,7 +22,7 @@ enum class ModbusResult : std::uint8_t { ok, timeout, closed, exception, wrong_u
 
 enum class ModbusFunction : std::uint8_t { read_registers = 3, write_registers = 16, read_write_registers = 23 };
 
-inline constexpr std::size_t modbus_most_bytes = 254;  // unit and PDU of 253
+inline constexpr std::size_t modbus_most_bytes = 254;  // unit and a PDU of 253
 inline constexpr std::size_t modbus_most_read = 125, modbus_most_written = 121;
 
 struct ModbusMessage {
@@ -32,22 +32,22 @@ struct ModbusMessage {
   [[nodiscard]] std::span<const std::uint8_t> span() const noexcept { return {bytes.data(), size}; }
 };
 
-// At most modbus_most_read registers read, modbus_most_written written; at least one.
+// Precondition: 1 to modbus_most_read registers read, 1 to modbus_most_written written.
 [[nodiscard]] ModbusMessage encode_read(std::uint8_t unit, std::uint16_t at, std::size_t count) noexcept;
 [[nodiscard]] ModbusMessage encode_write(std::uint8_t unit, std::uint16_t at,
                                          std::span<const std::uint16_t> values) noexcept;
 [[nodiscard]] ModbusMessage encode_read_write(std::uint8_t unit, std::uint16_t read_at, std::size_t read_count,
                                               std::uint16_t at, std::span<const std::uint16_t> values) noexcept;
 
-// What an answer says. `values` must be filled exactly by functions 3 and 23; nothing is changed unless the result is
-// ok. `exception`: the code, where the result is exception (a byte, so 0 to 255).
+// Decodes an answer. Functions 3 and 23 must fill `values` exactly; nothing is changed unless the result is ok.
+// `exception`: the code (0 to 255) if the result is exception.
 [[nodiscard]] ModbusResult decode_answer(std::span<const std::uint8_t> request, std::span<const std::uint8_t> answer,
                                          std::span<std::uint16_t> values, int& exception) noexcept;
 
 // Server device busy: the specification asks to send the request again later.
 inline constexpr int modbus_busy = 6;
 
-// "illegal data address", the specification's wording; "unknown" for codes that it doesn't have.
+// In the specification's wording: "illegal data address"; "unknown" for codes that it doesn't define.
 [[nodiscard]] const char* modbus_exception_name(int code) noexcept;
 
 }  // namespace proxarm::fieldbus

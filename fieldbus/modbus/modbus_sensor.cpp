@@ -90,7 +90,7 @@ bool ModbusSensor::poll(std::int64_t now_ns, CanFrame& frame) noexcept {
 
 void ModbusSensor::archive_input(StateArchive& state) noexcept {
   bool took = took_;
-  Sample sample = state.reading() ? read_ : taken_;  // each with the frame's outside
+  Sample sample = state.reading() ? read_ : taken_;  // both have the frame's id and length, which aren't archived
   state(took, sample);
   if (state.reading() && took) samples_.write(sample);
 }

@@ -1,9 +1,9 @@
-// A force sensor on a Modbus line, known by its file alone: the registers that hold a sample are read by function 3 at
-// the file's rate, and decoded as any described sensor's sample is (described_sensor.hpp), two bytes a register, high
-// byte first.
+// A force sensor on a Modbus line, known only by its description file. The worker reads the registers of a sample with
+// function 3 at the file's rate. The sample is decoded like that of any described sensor (described_sensor.hpp), two
+// bytes per register, high byte first.
 //
-// Two threads: the line's worker, which exchanges, and the cycle, which uses ForceSensor's functions. The cycle never
-// waits. An exchange that fails is a sample that is missing.
+// Two threads: the line's worker, which exchanges, and the cycle, which uses the functions of ForceSensor and never
+// waits. A failed exchange counts as a missing sample.
 #pragma once
 
 #include <atomic>
@@ -16,18 +16,18 @@ namespace proxarm::fieldbus {
 
 class ModbusSensor final : public ForceSensor {
  public:
-  // Throws SetupError where the file isn't of such a sensor, or the unit isn't 1 to 247.
+  // Throws SetupError if the file isn't of a Modbus sensor, or the unit isn't 1 to 247.
   ModbusSensor(const description::SensorDescription& sensor, std::uint32_t unit, const std::string& line);
 
-  // ---- the worker's ----
-  // Before the cycle: is it there? Throws SetupError.
+  // ---- worker thread ----
+  // Before the cycle: checks that the sensor answers. Throws SetupError.
   void start_up(ModbusClient& client, std::int64_t now_ns);
   void exchange(ModbusClient& client, std::int64_t now_ns) noexcept;
   [[nodiscard]] double rate_Hz() const noexcept { return protocol_.rate_Hz; }
   [[nodiscard]] int register_count() const noexcept { return protocol_.registers->count; }
   [[nodiscard]] double response_timeout_s() const noexcept { return protocol_.registers->response_timeout_s; }
 
-  // ---- the cycle's ----
+  // ---- cycle thread ----
   [[nodiscard]] std::vector<std::uint32_t> wanted_ids() const override { return {}; }
   void start(CanNetwork&, std::size_t, const FrameHandler&) override {}  // start_up() does it
   [[nodiscard]] std::string identity() const override;
@@ -57,8 +57,8 @@ class ModbusSensor final : public ForceSensor {
   TripleBuffer<Sample> samples_;
   std::atomic<std::uint64_t> failures_{0};
   std::atomic<ModbusResult> last_failure_{ModbusResult::ok};
-  Sample read_;   // the worker's
-  Sample taken_;  // the cycle's
+  Sample read_;   // used by the worker
+  Sample taken_;  // used by the cycle
   bool took_ = false;
 };
 

@@ -1,4 +1,4 @@
-// What an ATI Net CAN OEM is asked before the cycle, and its status word in words.
+// Requests to an ATI Net CAN OEM before the cycle, and its status word in words.
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -51,7 +51,7 @@ struct StatusBit {
   const char* text;
 };
 
-// Bit 15 is set together with any other.
+// Bit 15 is set whenever another bit is.
 constexpr StatusBit status_bits[] = {
     {0, "watchdog reset"},
     {1, "excitation voltage (DAC/ADC check) too high"},
@@ -71,11 +71,8 @@ constexpr StatusBit status_bits[] = {
     {15, "error"},
 };
 
-// Gaussian elimination with complete pivoting on rows scaled to 1 (force and torque rows differ in unit). The entries
-// are floats, each off by up to 2⁻²⁴ of itself; six eliminated columns add at most six such errors of the largest entry
-// (1) to what is left, so a pivot below 6·2⁻²⁴ can't be told from zero.
-// What comes in single frames, and once each: such an answer while another is waited for belongs to a request that was
-// given up. Taken for the present one's, rows of the calibration would stand in another's place.
+// True for a single-frame answer to another op: it belongs to an earlier request that was given up. Taken for an answer
+// to the present one, it would be stored as part of the calibration.
 bool is_of_another_request(std::uint32_t answered, std::uint8_t asked) noexcept {
   const bool is_single =
       answered == op_serial || answered == op_counts || answered == op_units || answered == op_firmware;
@@ -86,6 +83,9 @@ std::string timeout_text(const AtiNetCanOemSettings& settings) {
   return std::to_string(settings.answer_timeout_ns / 1'000'000) + " ms";
 }
 
+// Gaussian elimination with complete pivoting on rows scaled to 1 (force and torque rows differ in unit). The entries
+// are floats with a relative error of up to 2⁻²⁴. Six eliminated columns add at most six such errors of the largest
+// entry (1) to the remainder, so a pivot below 6·2⁻²⁴ can't be distinguished from zero.
 bool is_singular(std::array<std::array<double, 6>, 6> m) noexcept {
   for (auto& row : m) {
     double largest = 0.0;
@@ -121,7 +121,7 @@ AtiNetCanOem::AtiNetCanOem(AtiNetCanOemSettings settings) : settings_(std::move(
                       .found = hex_text(settings_.base_id, 2),
                       .expected = "0x00 to 0x7F (the identifiers on the wire are 16 times that, plus 0 to 15)"});
   }
-  // Below 0x080 a poll would outrank SYNC, and base id 0 would send NMT commands.
+  // Below 0x080, a poll would have a higher priority than SYNC; base id 0 would send NMT commands.
   if (settings_.base_id < 0x08 + 1) {
     throw SetupError(
         {.bus = settings_.bus_name,
@@ -175,7 +175,8 @@ std::vector<CanFrame> AtiNetCanOem::ask(CanNetwork& network, std::size_t bus, co
         return;
       }
       if (is_of_another_request(frame.id & 0xFU, op)) late = true;
-      // In order, all of this request: a late answer to an earlier one starts with a lower op or has another length.
+      // In order, and all of this request: a late answer to an earlier one starts with a lower op or has another
+      // length.
       if (received.time_ns < sent_ns || answer.size() >= frames || frame.id != id(op) + answer.size()) return;
       if (frame.length != bytes) {
         trouble = "an answer of " + std::to_string(frame.length) + " bytes instead of " + std::to_string(bytes);
@@ -183,7 +184,7 @@ std::vector<CanFrame> AtiNetCanOem::ask(CanNetwork& network, std::size_t bus, co
       }
       answer.push_back(frame);
     };
-    // After a failed attempt the whole time-out passes, so its late answer isn't taken for the next one's.
+    // After a failed attempt the whole timeout passes, so that its late answer isn't taken for the next one's.
     if (pump_frames(network, deadline_ns, handler,
                     [&](std::int64_t) { return late || answer.size() == frames ? pump_done : deadline_ns; }) &&
         !late) {

@@ -1,12 +1,11 @@
-// A channel of a force sensor that is stuck by itself: it repeats one reading while others go on.
+// Detects a stuck channel of a force sensor: it repeats one reading while other channels change.
 //
-// Whether a channel can be judged by that is learned from its first 200 samples, read while the arm stands. With x its
-// reading in counts, half the mean square of x(k) − x(k−1) is the variance of its noise, whatever it drifts meanwhile.
-// At half a count squared or more the noise before rounding has a standard deviation of 0.5 counts at least (rounding
-// adds 1/12, the estimate is right to within 50 % at five sigmas), so a sample repeats the last one with a probability
-// of 0.52 at most, and a hundred in a row with 0.52¹⁰⁰ = 4e-29: never, in six channels at 1 kHz for a century (2e13
-// samples). A quieter channel isn't judged. Readings that repeat as a whole count neither for nor against a channel:
-// those are ForceSample::repeats.
+// The first 200 samples, read while the arm stands, decide which channels can be judged. With x a channel's reading in
+// counts, half the mean square of x(k) − x(k−1) is the variance of its noise, whatever its drift. From half a count
+// squared on, the noise before rounding has a standard deviation of at least 0.5 counts (rounding adds 1/12; the
+// estimate is right to 50 % at five sigmas). A sample then repeats the last one with a probability of at most 0.52, and
+// a hundred in a row with 0.52¹⁰⁰ = 4e-29: never, in six channels at 1 kHz for a century (2e13 samples). A quieter
+// channel isn't judged. Samples that repeat in all channels don't count; ForceSample::repeats counts them.
 #pragma once
 
 #include <array>
@@ -21,7 +20,7 @@ class ChannelWatch {
  public:
   static constexpr std::uint32_t most_repeats = 100;
 
-  // The next sample, in counts; at most six channels.
+  // Adds a sample, in counts; at most six channels.
   void add(std::span<const double> counts) noexcept {
     State& s = state_;
     const std::size_t n = counts.size() < s.last.size() ? counts.size() : s.last.size();
@@ -37,7 +36,7 @@ class ChannelWatch {
     if (s.learned <= learning) s.learned += 1.0;
   }
 
-  // How often the channel that is stuck longest, of those that can be judged, has repeated its reading.
+  // How often the longest stuck channel, of those that can be judged, has repeated its reading.
   [[nodiscard]] std::uint32_t repeats() const noexcept {
     if (state_.learned <= learning) return 0;
     double most = 0.0;
@@ -55,7 +54,7 @@ class ChannelWatch {
   struct State {
     std::array<double, 6> last{};
     std::array<double, 6> repeats{};
-    std::array<double, 6> squares{};  // of the steps from sample to sample
+    std::array<double, 6> squares{};  // sums of squared steps between samples
     double learned = 0.0;             // samples so far
   };
   State state_;

@@ -1,10 +1,10 @@
-// A force/torque sensor that is known by its file alone (models/description/sensor_protocol.hpp): what the file says is
-// turned into tables once, and the cycle looks nothing up, allocates nothing and takes any bytes.
+// A force/torque sensor known only by its description file (models/description/sensor_protocol.hpp). The file is
+// converted to tables once; the cycle doesn't search or allocate, and accepts any bytes.
 //
-// A sample is complete when all of its frames have come in their order, within `together_s` of the first; its checksum
-// must be right, and its counter must have gone up. Halves of two samples are never mixed: where the sensor has neither
-// counter nor checksum, the sample after one that was torn apart is dropped too, since the order isn't certain there. A
-// polled sensor's frames must have been received after the poll, and one sample answers it.
+// A sample is complete when all its frames have come in order, within `together_s` of the first, with a right checksum
+// and an increased counter. Parts of two samples are never mixed: without counter and checksum, the sample after an
+// incomplete one is dropped too, since its order isn't certain. Frames of a polled sensor must come after the poll, and
+// one sample answers it.
 #pragma once
 
 #include <array>
@@ -19,28 +19,29 @@
 namespace proxarm::fieldbus {
 
 struct DescribedSensorSettings {
-  std::string bus_name;       // for messages
-  std::uint32_t base_id = 0;  // the cell's
+  std::string bus_name;  // for messages
+  std::uint32_t base_id = 0;
   std::int64_t answer_timeout_ns = 100'000'000;
-  int attempts = 10;                           // at start: a second in all for a sensor that is booting
-  std::int64_t pause_ns = 2'000'000;           // after each command
-  std::int64_t oldest_sample_ns = 20'000'000;  // streaming: what was on the wire that long before its cycle is dropped
+  int attempts = 10;                  // at start, so a booting sensor has a second
+  std::int64_t pause_ns = 2'000'000;  // after each command
+  // Streaming: frames that were on the wire earlier than this before their cycle are dropped.
+  std::int64_t oldest_sample_ns = 20'000'000;
 };
 
-// What has been wrong since the start; counts frames unless it says samples.
+// Errors since the start; counts of frames unless it says samples.
 struct DescribedSensorCounts {
   std::uint64_t wrong_lengths = 0;
-  std::uint64_t dropped = 0;        // repeated, out of order, too late, or before the poll
-  std::uint64_t late = 0;           // samples that answer an older poll than the last
-  std::uint64_t incomplete = 0;     // samples that lack a frame, or whose order isn't certain
+  std::uint64_t dropped = 0;        // repeated, out of order, late, or before the poll
+  std::uint64_t late = 0;           // samples that answer an older poll
+  std::uint64_t incomplete = 0;     // samples without a frame, or of uncertain order
   std::uint64_t bad_checksums = 0;  // samples
-  std::uint64_t repeated = 0;       // samples with the counter of the one before, or an older one
-  std::uint64_t lost = 0;           // samples, by the gaps of the counter
+  std::uint64_t repeated = 0;       // samples whose counter didn't increase
+  std::uint64_t lost = 0;           // samples missing between counters
 };
 
 class DescribedSensor final : public ForceSensor {
  public:
-  // Throws SetupError: a base id that the description doesn't allow, identifiers that are NMT's or SYNC's.
+  // Throws SetupError for a base id that the description doesn't allow, or for identifiers of NMT or SYNC.
   DescribedSensor(const description::SensorDescription& sensor, DescribedSensorSettings settings);
 
   [[nodiscard]] std::vector<std::uint32_t> wanted_ids() const override;
@@ -66,7 +67,7 @@ class DescribedSensor final : public ForceSensor {
  private:
   static constexpr std::size_t max_signals = description::max_sensor_signals;
 
-  // A number of the sample, ready to be cut out of it.
+  // A number of the sample, prepared for extraction.
   struct Slice {
     std::uint16_t byte = 0;
     std::uint8_t bytes = 0, shift = 0;
@@ -76,14 +77,14 @@ class DescribedSensor final : public ForceSensor {
   struct Slot {  // a frame of the sample
     std::uint32_t id = 0;
     std::uint8_t bytes = 0, head_bytes = 0;
-    std::uint16_t at = 0;  // where its data go
+    std::uint16_t at = 0;  // offset of its data in the sample
     bool own_head = false;
     std::array<std::uint8_t, 64> head{};
   };
   struct Channel {
     Slice slice;
     double scale = 1.0, offset = 0.0, lowest = 0.0, highest = 0.0;
-    Wrench column{};  // of the matrix
+    Wrench column{};  // column of the matrix
   };
 
   [[nodiscard]] static Slice slice_of(const description::NumberField& number) noexcept;
@@ -123,19 +124,19 @@ class DescribedSensor final : public ForceSensor {
 
   // Cycle.
   std::array<std::uint8_t, description::max_sample_bytes + 8> sample_{};  // a slice may be read past the end
-  std::size_t next_ = 0;                                                  // slot that is awaited; 0: the first
+  std::size_t next_ = 0;                                                  // slot of the next frame; 0: the first
   std::int64_t begun_ns_ = 0;
-  bool torn_ = false;                             // the order of what comes now isn't certain
+  bool torn_ = false;                             // the order of the next sample isn't certain
   std::int64_t poll_ns_ = 0, older_poll_ns_ = 0;  // the last poll and the one before
   bool polled_ = false;
   bool fresh_ = false;
-  bool counted_ = false;  // a counter has been seen
+  bool counted_ = false;  // a counter has been received
   std::uint64_t last_count_ = 0;
   ChannelWatch watch_;
   std::array<double, max_signals> numbers_{}, values_{};
   ForceSample latest_{};
   DescribedSensorCounts counts_{};
-  DescribedSensorCounts counts_before_{};  // the end of start(): what came until then is no loss
+  DescribedSensorCounts counts_before_{};  // counts at the end of start(); earlier errors aren't losses
 };
 
 }  // namespace proxarm::fieldbus

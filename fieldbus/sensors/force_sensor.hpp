@@ -1,12 +1,11 @@
-// A six-axis force/torque sensor on a CAN bus, whatever its make, as the master's cycle sees it.
+// Interface of a six-axis force/torque sensor to the master's cycle, independent of its make.
 //
 //   sensor.start(network, bus);                   // identity, calibration; throws SetupError
 //   each cycle:  if (sensor.poll(now, frame)) bus.send(frame);  ...  sensor.on_frame(frame, time);
 //                if (sensor.fresh()) use sensor.latest().wrench_S;
 //
-// Force is what acts on the sensor's tool side, in newtons and newton metres, in the sensor's own frame S and about its
-// own origin. Its zero is as the sensor was made: what it reads without a load, and what hangs there (tool weight), are
-// the caller's to take off.
+// The wrench acts on the sensor's tool side, in newtons and newton metres, in the sensor's frame S about its origin.
+// The caller subtracts the sensor's zero and the tool's weight.
 #pragma once
 
 #include <array>
@@ -28,14 +27,14 @@ using Wrench = std::array<double, 6>;  // fx fy fz (N), tx ty tz (Nm)
 struct ForceSample {
   Wrench wrench_S{};
   std::int64_t time_ns = 0;   // when its last frame was on the wire
-  std::uint32_t status = 0;   // the maker's status word, see describe_status()
+  std::uint32_t status = 0;   // the maker's status word; see describe_status()
   bool healthy = false;       // the status reports no error
-  bool saturated = false;     // some channel is at its rail, so the wrench is not to be believed
-  bool late = false;          // on the wire before the last poll: it answers an older one, and is a cycle older
-  std::uint64_t number = 0;   // counts the samples, from 1
-  std::uint32_t repeats = 0;  // samples before this one with exactly the same raw reading: a frozen sensor
+  bool saturated = false;     // some channel is at the end of its range; the wrench can't be trusted
+  bool late = false;          // was on the wire before the last poll: answers an older one, and is a cycle old
+  std::uint64_t number = 0;   // counts samples, from 1
+  std::uint32_t repeats = 0;  // samples before this one with the same raw reading: many mean a frozen sensor
 
-  std::uint32_t channel_repeats = 0;  // of one channel alone, while others went on (channel_watch.hpp)
+  std::uint32_t channel_repeats = 0;  // the same for a single channel while others change (channel_watch.hpp)
 
   void archive(StateArchive& state) noexcept {
     state(wrench_S, time_ns, status, healthy, saturated, late, number, repeats, channel_repeats);
@@ -54,35 +53,37 @@ class ForceSensor {
 
   // ---- before the cycle ----
   [[nodiscard]] virtual std::vector<std::uint32_t> wanted_ids() const = 0;  // for the kernel's filters
-  // All that it sends and is sent, for the check that nobody else does.
+  // All identifiers that it sends and receives, to check that no other device uses them.
   [[nodiscard]] virtual std::vector<std::uint32_t> used_ids() const { return wanted_ids(); }
-  // Reads and checks what the sensor says of itself, and starts it; throws SetupError. Frames of others go to `other`.
+  // Reads and checks the sensor's identity and calibration, and starts it; throws SetupError. Frames of others go to
+  // `other`.
   virtual void start(CanNetwork& network, std::size_t bus, const FrameHandler& other = {}) = 0;
-  // What was learned at start: make, serial number, calibration; one line for the log.
+  // Make, serial number and calibration, as read at start; one line for the log.
   [[nodiscard]] virtual std::string identity() const = 0;
 
   // ---- cycle: noexcept, no allocation ----
-  // The frame that asks for the next sample; false where the sensor streams by itself. What was received before no
-  // longer counts as fresh. A sample that comes between two polls and after its cycle had stopped waiting is taken in
-  // the next cycle, unless that one's own comes in time; older ones are dropped.
+  // The frame that requests the next sample; false if the sensor streams. Samples received before are no longer fresh.
+  // A sample that comes between two polls, after its cycle has stopped waiting, is used in the next cycle unless that
+  // cycle's own sample comes in time. Older samples are dropped.
   virtual bool poll(std::int64_t now_ns, CanFrame& frame) noexcept = 0;
-  virtual bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept = 0;  // true when it was the sensor's
-  [[nodiscard]] virtual bool fresh() const noexcept = 0;  // a whole sample was taken since the last poll
-  // Nothing newer can come in this cycle: there is no use in waiting.
+  // True if the frame was the sensor's.
+  virtual bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept = 0;
+  [[nodiscard]] virtual bool fresh() const noexcept = 0;  // a whole sample was received since the last poll
+  // True if no newer sample can come in this cycle, so that waiting is useless.
   [[nodiscard]] virtual bool answered() const noexcept { return fresh(); }
   [[nodiscard]] virtual const ForceSample& latest() const noexcept = 0;
-  // What was read at start, and all that changes in a cycle.
+  // The values read at start, and all state that changes in a cycle.
   virtual void archive(StateArchive& state) noexcept = 0;
-  // What this cycle took that came by no frame of a CAN bus; reading gives it back before the cycle.
+  // Input of this cycle that didn't come by a CAN frame; reading restores it before the cycle.
   virtual void archive_input(StateArchive& /*state*/) noexcept {}
 
   // ---- in words, not for the cycle ----
   [[nodiscard]] virtual std::string describe_status(std::uint32_t status) const = 0;
-  // What has been wrong with what came since it was started: "4 samples with a bad checksum"; empty: nothing.
+  // Errors of received frames since the start: "4 samples with a bad checksum"; empty: none.
   [[nodiscard]] virtual std::string describe_losses() const { return {}; }
 };
 
-// "12 frames late, 3 samples incomplete": those of the counts that aren't 0.
+// The counts that aren't 0, as text: "12 frames late, 3 samples incomplete".
 struct LossCount {
   std::uint64_t count;
   const char* what;

@@ -1,15 +1,14 @@
-// Discrete events at absolute times: what drives the simulated far end of the wire.
+// Discrete events at absolute times; runs the simulated devices and buses.
 //
 // The same queue serves virtual time (SimulatedCanNetwork runs events until the controller's deadline) and real time (a
-// loop that sleeps until next_time() and then calls run_until() with the clock's reading). Times are int64 nanoseconds
-// of whatever clock the owner uses.
+// loop sleeps until next_time() and then calls run_until()). Times are int64 nanoseconds of the owner's clock.
 //
-// Order: by time, and in the order of scheduling among equal times, so a run is a function of its input alone.
-// An event scheduled for the past runs at once, at now_ns(): time never steps back.
+// Events run in the order of time, then of scheduling, so a run depends on its input alone. An event scheduled for the
+// past runs at once, at now_ns(): time never steps back.
 //
-// A callback is any movable callable of at most `callback_bytes` bytes, called as f() or f(time_ns), time_ns being the
-// event's own time. It may schedule and cancel events. It lives in a reused slot: once the number of events pending at
-// the same time has reached its peak (or reserve() named it), nothing allocates. For one thread.
+// A callback is any movable callable of at most `callback_bytes` bytes, called as f() or f(time_ns) with the event's
+// time. It may schedule and cancel events. Its storage is reused: nothing allocates up to the largest number of pending
+// events so far, or the number given to reserve(). Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +28,7 @@ class EventQueue {
   static constexpr std::size_t callback_bytes = 48;
   static constexpr std::int64_t never = std::numeric_limits<std::int64_t>::max();
 
-  // Names a scheduled event; a default one names none. Stays safe to cancel() after its event has run.
+  // Names a scheduled event; a default one names no event. cancel() is safe after the event has run.
   struct EventId {
     std::uint32_t slot = 0;
     std::uint32_t generation = 0;
@@ -61,12 +60,12 @@ class EventQueue {
   // True if the event was still pending. Its callback is destroyed at once and never runs.
   bool cancel(EventId id) noexcept;
 
-  // Runs all events up to and including time_ns in order, those scheduled meanwhile too; leaves now_ns() at time_ns.
+  // Runs all events up to and including time_ns in order, also those scheduled meanwhile; then now_ns() is time_ns.
   void run_until(std::int64_t time_ns);
-  // Runs the one next event if its time is at most limit_ns; leaves now_ns() at its time. False if there is none.
+  // Runs the next event if its time is at most limit_ns; then now_ns() is its time. False if there is none.
   bool run_next(std::int64_t limit_ns = never);
-  // Lets time pass without running anything: for a real-time loop before it handles input that came at time_ns, with
-  // next_time() > time_ns. Never steps back.
+  // Advances time without running events, for a real-time loop before it handles input. Never steps back. Precondition:
+  // next_time() > time_ns.
   void advance_to(std::int64_t time_ns) noexcept { now_ns_ = time_ns > now_ns_ ? time_ns : now_ns_; }
 
   [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }

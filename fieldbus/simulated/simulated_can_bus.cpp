@@ -11,7 +11,7 @@ namespace {
 
 using description::SetupError;
 
-constexpr int error_frame_bits = 17;  // error flag 6, delimiter 8, interframe space 3: after the frame itself
+constexpr int error_frame_bits = 17;  // after the frame: error flag 6, delimiter 8, interframe space 3
 
 void check(const SimulatedBusConfig& config) {
   const auto refuse = [&config](const char* key, std::int64_t found, const char* expected) {
@@ -121,7 +121,7 @@ ErrorCounters SimulatedCanBus::error_counters(std::string_view name) const noexc
   return {};
 }
 
-// A rule's state stays until a rule ends it.
+// A state set by a rule stays until a rule ends it.
 void SimulatedCanBus::force_state(Port& port, BusState state) noexcept {
   port.follows_errors = state == BusState::error_active;
   port.errors = {};
@@ -131,7 +131,7 @@ void SimulatedCanBus::force_state(Port& port, BusState state) noexcept {
 void SimulatedCanBus::change_state(Port& port, BusState state) noexcept {
   if (is_off(state)) {
     port.purge();
-    if (sender_ == &port) sender_ = nullptr;  // its frame is cut off: nobody receives it
+    if (sender_ == &port) sender_ = nullptr;  // its frame is cut off, so no port receives it
   }
   port.set_state(state);
   if (!is_off(state) && !transmitting_) request_arbitration();  // frames may have waited for an acknowledgement
@@ -172,7 +172,7 @@ void SimulatedCanBus::follow_errors(Port& port) noexcept {
   });
 }
 
-// An event rather than a call: everything that happens at this same moment may still enter the arbitration.
+// Schedules an event instead of calling arbitrate(): frames queued at the same time may still take part.
 void SimulatedCanBus::request_arbitration() {
   if (arbitration_requested_) return;
   arbitration_requested_ = true;
@@ -204,7 +204,7 @@ void SimulatedCanBus::arbitrate() {
   Port* winner = arbitration_winner();
   if (winner == nullptr) return;
   if (!is_acknowledged(*winner)) {
-    // A real controller repeats the frame for ever, error passive; here it waits in silence for someone to join.
+    // A real controller, error passive, would repeat the frame without end; this one waits silently for another node.
     if (winner == ports_.front().get() && status_.state != BusState::error_passive) {
       force_state(*winner, BusState::error_passive);
       ++status_.error_frames;
@@ -229,7 +229,7 @@ void SimulatedCanBus::arbitrate() {
   events_.schedule(idle_ns_ - interframe_ns_, [this] { complete(); });
 }
 
-// End of the EOF field: all receive, then the next arbitration.
+// At the end of the EOF field: delivers the frame to all ports, then arbitrates again.
 void SimulatedCanBus::complete() {
   bool destroyed = sender_ == nullptr, duplicated = false, dropped = false;
   for (const std::size_t i : matched_) {

@@ -1,4 +1,4 @@
-// What fault rules do to the frames and ports of a SimulatedCanBus.
+// Applies fault rules to the frames and ports of a SimulatedCanBus.
 #include <limits>
 #include <memory>
 #include <string>
@@ -12,7 +12,7 @@ namespace {
 
 using description::SetupError;
 
-// What a rule does to the content of a frame that it matches.
+// Alters the content of a frame that a rule matches.
 void alter(CanFrame& frame, const FaultRule& rule) noexcept {
   if (rule.action == FaultAction::corrupt) {
     for (const BitFlip flip : rule.flips) {
@@ -120,7 +120,7 @@ void SimulatedCanBus::babble(const FaultRule& rule) {
                       .message = "needs a period above 0 and a frame that this bus can carry"});
   }
   Port* port = ports_.emplace_back(std::make_unique<Port>(*this, "babbling node", nullptr, 1)).get();
-  // Kept among the faults for its frame; the empty time window keeps it from matching any.
+  // Kept among the faults for its frame; `first` at its maximum keeps it from matching any frame.
   ActiveFault fault{rule, 0};
   fault.rule.first = std::numeric_limits<std::uint64_t>::max();
   faults_.push_back(fault);

@@ -1,14 +1,14 @@
-// The wire in one process: the CAN buses of a cell in virtual time, for `proxarm run --bus sim` and for tests.
+// The CAN buses of a cell inside one process, in virtual time, for `proxarm run --bus sim` and for tests.
 //
 //   SimulatedCanNetwork network({{.name = "axes_1_3"}, {.name = "sensor"}});
 //   CanPort& port = network.simulated_bus(0).attach(drive, "drive 1");   // drive.on_frame() answers with port.send()
 //   network.events().schedule(0, [&] { drive.servo_tick(); });
 //   network.sleep_until(1'000'000);                                      // the controller's side: events run meanwhile
 //
-// Time starts at 0 and advances only inside wait_for_frame() and sleep_until(), by running events; the controller's own
-// computing takes none. Everything is a function of the input alone: two runs are identical.
-// Steady state allocates nothing once each identifier has been seen and the event queue has reached its size.
-// One thread. All nodes are attached before apply() and before the first wait.
+// Time starts at 0 and advances only in wait_for_frame() and sleep_until(), which run events; the controller's
+// computing takes no virtual time. Everything depends on the input alone: two runs are identical. Nothing allocates
+// once each identifier has been seen and the event queue has reached its size. One thread. All nodes must be attached
+// before apply() and before the first wait.
 #pragma once
 
 #include <cstddef>
@@ -26,35 +26,34 @@ namespace proxarm::fieldbus {
 
 class SimulatedCanNetwork final : public CanNetwork {
  public:
-  // Throws SetupError for a bitrate that CAN doesn't have or a name given twice.
+  // Throws SetupError for an invalid bitrate or a name given twice.
   explicit SimulatedCanNetwork(const std::vector<SimulatedBusConfig>& buses);
   ~SimulatedCanNetwork() override;
 
   [[nodiscard]] EventQueue& events() noexcept { return events_; }
   [[nodiscard]] SimulatedCanBus& simulated_bus(std::size_t index) noexcept { return *buses_[index]; }
-  // By name; throws SetupError naming those that exist.
+  // By name; throws SetupError that lists the existing names.
   [[nodiscard]] SimulatedCanBus& simulated_bus(std::string_view name);
 
-  // Adds the rules to those already there. Throws SetupError for a bus or a port that doesn't exist.
+  // Adds rules. Throws SetupError for a bus or a port that doesn't exist.
   void apply(const FaultScript& script);
-  // Called for every frame of every bus at its end; may not send. One observer; an empty function ends it.
+  // Called for every frame of every bus at its end; must not send. Only one observer; an empty function removes it.
   void set_observer(const WireObserver& observer);
-  // Never runs ahead of the machine's monotonic clock from now on: an in-process run at the pace of real time. Where
-  // the machine is late by up to longest_catch_up_ns, the clock here waits, and catches up afterwards. A longer gap, as
-  // of a process that was suspended, goes by here as it does on a bus: all nodes live through it, and the sleep ends
-  // late.
+  // From now on virtual time never runs ahead of the machine's monotonic clock. If the machine is late by up to
+  // longest_catch_up_ns, virtual time waits and then catches up. A longer gap, such as a suspended process, passes as
+  // on a real bus: all nodes keep running, and the sleep ends late.
   void follow_real_time();
-  static constexpr std::int64_t longest_catch_up_ns = 200'000'000;  // more than a busy machine keeps one waiting for
-  static constexpr std::int64_t longest_gap_ns = 1'000'000'000;     // what is beyond is left out, to be there in time
-  // By how much the machine was late when the last sleep ended, which was due at some event or deadline.
+  static constexpr std::int64_t longest_catch_up_ns = 200'000'000;  // longer than a busy machine delays a process
+  static constexpr std::int64_t longest_gap_ns = 1'000'000'000;     // the rest of a longer gap is skipped
+  // How late the machine was at the end of the last sleep.
   [[nodiscard]] std::int64_t woken_late_ns() const noexcept { return woken_late_ns_; }
 
   [[nodiscard]] std::size_t bus_count() const noexcept override { return buses_.size(); }
   [[nodiscard]] CanBus& bus(std::size_t index) noexcept override { return *buses_[index]; }
   [[nodiscard]] std::int64_t now_ns() const noexcept override { return events_.now_ns(); }
-  // Also runs the events at the deadline itself.
+  // Also runs the events at the deadline.
   void sleep_until(std::int64_t deadline_ns) noexcept override;
-  // A frame that completes at the deadline itself is still in time.
+  // A frame that completes exactly at the deadline is in time.
   bool wait_for_frame(std::int64_t deadline_ns) noexcept override;
   [[nodiscard]] std::int64_t waited_ns() const noexcept override { return waited_ns_; }
   [[nodiscard]] std::int64_t behind_ns() const noexcept override;  // 0 without follow_real_time()
@@ -68,7 +67,8 @@ class SimulatedCanNetwork final : public CanNetwork {
   std::int64_t waited_ns_ = 0;  // by the machine's clock
   std::vector<std::unique_ptr<SimulatedCanBus>> buses_;
   bool real_time_ = false;
-  std::int64_t real_time_offset_ns_ = 0, woken_late_ns_ = 0;  // of the monotonic clock against virtual time
+  // real_time_offset_ns_ is the monotonic clock minus virtual time.
+  std::int64_t real_time_offset_ns_ = 0, woken_late_ns_ = 0;
 };
 
 }  // namespace proxarm::fieldbus

@@ -42,7 +42,7 @@ std::string linked(const Urdf& urdf, const tinyxml2::XMLElement& joint, const ch
   return attribute(urdf, *element, "link");
 }
 
-// Checks what MuJoCo would accept for links that don't move, or would report without a line.
+// Reports a wrong mass with its line: MuJoCo would accept it for a link that doesn't move, or report it without a line.
 void check_mass(const Urdf& urdf, const tinyxml2::XMLElement& link) {
   const tinyxml2::XMLElement* inertial = link.FirstChildElement("inertial");
   const tinyxml2::XMLElement* mass = inertial != nullptr ? inertial->FirstChildElement("mass") : nullptr;
@@ -118,7 +118,7 @@ void read_link(Urdf& urdf, tinyxml2::XMLElement& element) {
   urdf.links.push_back(std::move(link));
 }
 
-// Checks that joints connect links that exist, and that exactly one link is the root.
+// Checks that joints connect existing links, and that exactly one link is the root.
 void check_tree(Urdf& urdf) {
   std::set<std::string> names, children;
   for (const UrdfLink& link : urdf.links) names.insert(link.name);
@@ -190,7 +190,8 @@ Urdf load_urdf(const std::filesystem::path& file) {
   compiler->SetAttribute("fusestatic", "false");
   compiler->SetAttribute("discardvisual", "true");
   compiler->SetAttribute("strippath", "false");
-  // URDFs often round inertias so that the triangle inequality fails in the last digit. MuJoCo would refuse them.
+  // URDFs often round inertias so that the triangle inequality fails in the last digit. Without this MuJoCo refuses
+  // them.
   compiler->SetAttribute("balanceinertia", "false");
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);
@@ -199,7 +200,7 @@ Urdf load_urdf(const std::filesystem::path& file) {
 }
 
 MujocoModel compile(const Urdf& urdf) {
-  // The file system in memory consists of 2 MB of arrays, so it is on the heap; it is freed in any case.
+  // The file system in memory has 2 MB of arrays, so it is on the heap.
   struct Vfs {
     std::unique_ptr<mjVFS> files = std::make_unique<mjVFS>();
     Vfs() { mj_defaultVFS(files.get()); }

@@ -1,9 +1,9 @@
-// Reads a URDF into a MuJoCo model, and avoids some of MuJoCo's defaults.
+// Reads a URDF into a MuJoCo model, avoiding some of MuJoCo's defaults.
 //
 // By default MuJoCo 2.2.2 fuses links that are fixed to each other (the flange disappears), silently ignores <mimic>,
-// and opens mesh files. So the file is read here first. <mimic> is refused. Shapes are dropped, since kinematics and
-// dynamics need none; each moving link must state its <inertial>. Compiler settings that keep every link are added in
-// memory, and mistakes are reported with file and line. For set-up only.
+// and opens mesh files. So this reader parses the file first. It refuses <mimic>, drops shapes, and adds settings that
+// keep every link, in memory only. Each moving link must state its <inertial>. Mistakes are reported with file and
+// line. For set-up.
 #pragma once
 
 #include <filesystem>
@@ -31,7 +31,7 @@ struct Urdf {
   std::vector<UrdfJoint> joints;  // in the file's order
   std::vector<UrdfLink> links;
   std::string root_link;
-  std::string mujoco_xml;  // the file as it is passed to MuJoCo
+  std::string mujoco_xml;  // the file as passed to MuJoCo
 };
 
 struct MujocoModelDeleter {

@@ -26,7 +26,7 @@ Jacobian weighted(const Jacobian& J_W) noexcept {
   return J;
 }
 
-// Three columns of Jᵀ(J Jᵀ + λ²E)⁻¹, from `first` on, of a J whose rotations are weighted with the length.
+// Three columns of Jᵀ(J Jᵀ + λ²E)⁻¹, from `first` on, with J's rotations weighted by the length.
 SmallColumns3 columns_of_inverse(const Jacobian& J_W, Eigen::Index first) noexcept {
   const Jacobian J = weighted(J_W);
   Mat6 A = J.lazyProduct(J.transpose());

@@ -16,14 +16,14 @@ namespace {
 using Vec6 = Vec<6>;
 using Status = InverseKinematicsResult::Status;
 
-// rest_share: the share of a joint's step limit for turning the tool back and for the null space. end_share: the share
-// of a joint's range that counts as near one of its ends.
+// rest_share: part of a joint's step limit for turning the tool back and for the null space. end_share: part of a
+// joint's range that counts as near an end.
 constexpr double rest_share = 0.1, end_share = 0.15;
-// The weight of the tool's rotation against the joints'. Below this, the orientation is given up.
+// Weight of the tool's rotation against the joints'. Below this, the orientation is given up.
 constexpr double least_turning_weight = 1e-3;
 
-// The logarithm of a rotation as rotation vector, |·| ≤ π. It is computed from the quaternion, whose vector part is
-// exact to rounding for small angles.
+// The logarithm of a rotation as rotation vector, |·| ≤ π. Computed from the quaternion, whose vector part is exact to
+// rounding for small angles.
 Vec3 rotation_vector(const Mat3& R) noexcept {
   Eigen::Quaterniond r(R);
   if (r.w() < 0.0) r.coeffs() = -r.coeffs();
@@ -32,8 +32,8 @@ Vec3 rotation_vector(const Mat3& R) noexcept {
   return (2.0 * std::atan2(s, r.w()) / s) * r.vec();
 }
 
-// The smallest singular value and its left vector, by the power method on J⁻¹, started with its largest row. It
-// converges with the squared ratio of the two smallest singular values, so it is accurate near singularities.
+// The smallest singular value and its left vector, by the power method on J⁻¹ from its largest row. Converges with the
+// squared ratio of the two smallest singular values, so it is accurate near singularities.
 void smallest_singular_value(const Mat6& inverse, double& sigma, Vec6& direction) noexcept {
   Eigen::Index row = 0;
   inverse.rowwise().squaredNorm().maxCoeff(&row);
@@ -67,8 +67,7 @@ void require_straight_ways(const Arm& arm, const ToolSpace& space) {
 
 bool is_pose(const Pose& X) noexcept {
   const Mat3 R = X.linear();
-  // Products of poses deviate from orthonormal by far less than 1e-6, and a deviation of that size doesn't affect the
-  // solution.
+  // Products of poses deviate from orthonormal by far less than 1e-6, which wouldn't affect the solution.
   return X.matrix().allFinite() && (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-6 &&
          R.determinant() > 0.0;
 }
@@ -110,7 +109,7 @@ void InverseKinematics::set_max_step(const std::array<double, max_axes>& max_ste
   other_max_step_ = Eigen::Map<const JointVector>(config_.max_step_rad.data(), arm_.axes());
 }
 
-// Updates kinematics and residuals at result.q. Returns the weighted error of the pose.
+// Updates kinematics and residuals at result.q. Returns the pose's weighted error.
 InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
   const JointVector& known = result.kinematics.q_rad;
   if (known.size() != result.q.size() || known != result.q) arm_.kinematics(result.q, result.kinematics);
@@ -125,7 +124,7 @@ InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinema
   return e;
 }
 
-// The part of the error that can be reached: all of it, or the position in the tool's space.
+// The reachable part of the error: all of it, or the position in the tool's space.
 InverseKinematics::Vec6 InverseKinematics::task_error(Vec6 error, InverseKinematicsResult& result) const noexcept {
   if (reaches_orientation()) return error;
   const Vec3 e_p = projection_.lazyProduct(error.head<3>());
@@ -151,7 +150,7 @@ bool InverseKinematics::arrived(const InverseKinematicsResult& result) const noe
          (result.rotation_residual_rad <= config_.rotation_tolerance_rad || !reaches_orientation());
 }
 
-// Newton's method. True if it ended within tolerance and within the step limit; otherwise result.q is its last iterate.
+// Newton's method. True if it ended within tolerance and step limit; otherwise result.q is the last iterate.
 bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
   Vec6 e = error(X_WT, result);
   FactoredMatrix J;
@@ -162,7 +161,7 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
     if (i == config_.max_iterations) return false;
     J.factor(task_jacobian<6>(result.kinematics));
     const Vec6 q = result.q + J.solve(e);
-    // Written so that NaN and infinity, from a singular J, are refused here, too.
+    // Written so that NaN and infinity, from a singular J, are refused, too.
     if (!(((q - q0).array().abs() <= max_step_.array()).all())) return false;
     result.q = q;
     ++result.iterations;
@@ -170,8 +169,8 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
   }
 }
 
-// The same for other numbers of axes. The null space has its share in the first step, even if the tool stands. This
-// bends the path of the task slightly, which the following steps correct.
+// The same for other numbers of axes. Null-space motion belongs to the first step, even if the tool stands. It bends
+// the task's path slightly, which the next steps correct.
 bool InverseKinematics::by_priority(const JointVector& q0, const Pose& X_WT,
                                     InverseKinematicsResult& result) const noexcept {
   Vec6 pose_error = error(X_WT, result), e = task_error(pose_error, result);
@@ -204,8 +203,8 @@ bool InverseKinematics::within_step(const JointVector& q, const JointVector& q0)
   return ((q - q0).array().abs() <= other_max_step_.array()).all();
 }
 
-// The step for the task, and as much of the null-space step as the limit leaves room for. If holding the orientation
-// takes more than the limit (a stretched wrist), its weight is reduced step by step.
+// The task's step, plus as much null-space motion as the limit allows. If holding the orientation exceeds the limit (a
+// stretched wrist), its weight is reduced step by step.
 JointVector InverseKinematics::next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e, bool with_rest,
                                            const InverseKinematicsResult& result) const noexcept {
   PrioritizedStep step;
@@ -245,8 +244,8 @@ JointVector InverseKinematics::towards_posture(const JointVector& q) const noexc
   return -config_.posture_share * g;
 }
 
-// Damped steps that stay within ±box of q0. Each uses the least damping with which it stays there and brings the tool
-// nearer by at least a quarter of what J predicts. (If it brings less, J predicts the step's end badly.)
+// Damped steps within ±box of q0. Each uses the least damping that keeps it there and brings the tool nearer by at
+// least a quarter of J's prediction; with less, J is too far from linear.
 template <int Axes>
 void InverseKinematics::damped(const Angles<Axes>& q0, const Angles<Axes>& box, int iterations, const Pose& X_WT,
                                InverseKinematicsResult& result) const noexcept {
@@ -270,8 +269,8 @@ void InverseKinematics::damped(const Angles<Axes>& q0, const Angles<Axes>& box, 
     const Angles<Axes> q_before = result.q;
     const double before = e.norm();
     constexpr double quarter = 0.25;
-    // Values of σ below 1e-8 σ_max are rounding of J Jᵀ. The tried values of λ reach from there to far above σ_max,
-    // where the step is tiny.
+    // Values of σ below 1e-8 σ_max are rounding of J Jᵀ. λ is tried from there to far above σ_max, where steps are
+    // tiny.
     double lambda2 = 1e-16 * squares[5];
     bool nearer = false;
     for (int rung = 0; rung < 24 && !nearer; ++rung, lambda2 *= 8.0) {
@@ -333,7 +332,7 @@ void InverseKinematics::solve_for(const JointVector& q, const Pose& X_WT,
   }
   result.q = q;
   damped<Axes>(q0, most, config_.max_damped_iterations, X_WT, result);
-  // Whether the limit stopped the joints: one of them has used up most of it.
+  // Whether the limit stopped the joints: one of them has used most of it.
   const bool at_limit = ((result.q - q0).array().abs() > 0.5 * most.array()).any();
   result.status = arrived(result)                                                         ? Status::converged
                   : result.smallest_singular_value_m_per_rad < config_.singular_m_per_rad ? Status::singular
@@ -357,7 +356,7 @@ std::optional<JointVector> InverseKinematics::solve_anywhere(const Pose& X_WT, c
       damped<Eigen::Dynamic>(result.q, JointVector::Constant(arm_.axes(), anywhere), iterations, X_WT, result);
     }
     if (!arrived(result)) continue;
-    // Full turns don't move the tool, so each joint is put as near to q_near as its range allows.
+    // Full turns don't move the tool, so each joint goes as near to q_near as its range allows.
     bool inside = true;
     for (int i = 0; i < arm_.axes(); ++i) {
       constexpr double turn = 2.0 * std::numbers::pi;

@@ -15,7 +15,7 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-// The three numbers of an attribute; `missing` if it isn't there or is something else.
+// The three numbers of an attribute, or `missing`.
 Vec3 triple_of(const XMLElement* element, const char* name, const Vec3& missing) {
   const char* const text = element != nullptr ? element->Attribute(name) : nullptr;
   double x = 0.0, y = 0.0, z = 0.0;
@@ -36,7 +36,7 @@ double size_of(const XMLElement& element, const char* name) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-// The robot's colours, to which <material name="…"> refers.
+// The robot's named colours, for <material name="…">.
 using Colours = std::map<std::string, std::array<double, 3>>;
 
 std::optional<std::array<double, 3>> colour_of(const XMLElement* material, const Colours& named) {
@@ -59,7 +59,7 @@ Colours colours_of(const XMLElement& robot) {
   return colours;
 }
 
-// "package://name/path" is searched beside the URDF and above it, since only ROS would know where the package is.
+// Searches "package://name/path" in the URDF's folder and the folders above: only ROS would know the package's place.
 std::filesystem::path mesh_path(const std::filesystem::path& urdf, const std::string& name) {
   constexpr std::string_view package = "package://", file = "file://";
   if (name.compare(0, file.size(), file) == 0) return name.substr(file.size());

@@ -1,8 +1,8 @@
-// The shapes and poses of an arm's links: for pictures, never for control.
+// The shapes and poses of an arm's links, for pictures; never for control.
 //
-// The URDF is read here a second time, without MuJoCo: all links, also those without a moving joint, each with its
-// <visual> shapes. A shape that can't be drawn (one that URDF doesn't have, or a mesh file of another format) is left
-// out and named in notes(), since an incomplete picture is better than none.
+// Reads the URDF a second time, without MuJoCo: all links, with their <visual> shapes. A shape that can't be drawn
+// (unknown to URDF, or a mesh file of another format) is left out and named in notes(): an incomplete picture is better
+// than none.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ namespace proxarm::models {
 struct DrawnBox {
   Vec3 size_m = Vec3::Ones();
 };
-struct DrawnCylinder {  // along z, about the origin
+struct DrawnCylinder {  // along z, centred at the origin
   double radius_m = 0.0, length_m = 0.0;
 };
 struct DrawnSphere {
@@ -44,13 +44,13 @@ struct DrawnLink {
   Pose X_parent = Pose::Identity();  // the joint's pose in the parent at angle zero
   Vec3 axis = Vec3::UnitX();         // the joint's, in the link
   int drive = -1;                    // index in the cell's drives; −1: fixed
-  bool slides = false;               // prismatic along the axis, in m; else revolute
+  bool slides = false;               // prismatic along the axis, in m; otherwise revolute
   std::vector<LinkShape> shapes;
 };
 
 class LinkTree {
  public:
-  // Throws description::SetupError for a URDF that can't be read.
+  // Throws description::SetupError if the URDF can't be read.
   explicit LinkTree(const description::Cell& cell);
 
   // All links, parents before their children.

@@ -1,11 +1,11 @@
-// Archives a plain struct by its declaration, without a list of its members that somebody could forget one in.
+// Archives a plain struct without a list of its members, from which one could be forgotten.
 //
 //   struct State { double angle_rad = 0.0; models::Vec3 q_W = models::Vec3::Zero(); };
 //   void archive(StateArchive& state) noexcept { archive_fields(state, state_); }
 //
-// The members are counted by the number of initialisers that the aggregate takes, and named by a structured binding of
-// that many. Members are what StateArchive takes, or plain structs in their turn. No base classes, no C arrays, at most
-// 16 members: more would be more than one thing.
+// The number of initialisers that the aggregate accepts counts the members; a structured binding of that size names
+// them. Members are types that StateArchive accepts, or plain structs. No base classes, no C arrays, at most 16
+// members.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 namespace proxarm::fieldbus {
 namespace detail {
 
-// Initialises a member of any type; only ever declared.
+// Converts to a member of any type; only declared, never defined.
 struct AnyMember {
   template <typename T>
   operator T() const noexcept;  // NOLINT(google-explicit-constructor)
@@ -39,7 +39,7 @@ constexpr std::size_t count_fields() {
   }
 }
 
-// A struct without an archive() of its own; an array is archived as a whole.
+// A struct without an archive() function. An array is archived as a whole.
 template <typename T>
 concept PlainStruct = std::is_class_v<T> && std::is_aggregate_v<T> && !requires {
   std::tuple_size<T>::value;
@@ -51,7 +51,7 @@ concept PlainStruct = std::is_class_v<T> && std::is_aggregate_v<T> && !requires 
 template <typename T>
 inline constexpr std::size_t field_count = detail::count_fields<T>();
 
-// visit(member) for each member of the struct, in the order of their declaration.
+// Calls visit(member) for each member of the struct, in the order of declaration.
 template <typename T, typename Visit>
 constexpr void for_each_field(T& object, Visit&& visit) noexcept {
   const auto each = [&](auto&... member) { (visit(member), ...); };

@@ -1,5 +1,5 @@
-// Helpers of the validate() functions in this folder: a range that doesn't hold becomes a SetupError with the option's
-// name, the value found and the range expected.
+// Helpers for validate() functions: a value out of range becomes a SetupError with the option's name, the value found
+// and the range expected.
 #pragma once
 
 #include <cmath>

@@ -12,7 +12,7 @@ namespace proxarm::description {
 namespace {
 
 // SI value = number · multiply / divide. Powers of ten are exact in a double, and dividing by one rounds once, so "1ms"
-// is the same double as 1e-3.
+// equals 1e-3 exactly.
 struct Unit {
   std::string_view name;
   double multiply, divide;
@@ -55,7 +55,7 @@ double parse(std::string_view text, std::string_view option, const Kind& kind) {
   std::string_view rest = text;
   while (rest.starts_with(' ')) rest.remove_prefix(1);
   while (rest.ends_with(' ')) rest.remove_suffix(1);
-  // The longest beginning that is a number; what follows is the unit. ("1e3s" is 1000 s; no unit begins with e.)
+  // The longest beginning that is a number; the rest is the unit. ("1e3s" is 1000 s; no unit begins with e.)
   std::size_t length = std::min<std::size_t>(rest.size(), 64);
   std::optional<double> number;
   while (length > 0 && !(number = strict_number(rest.substr(0, length)))) --length;

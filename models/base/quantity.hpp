@@ -1,7 +1,7 @@
-// Numbers with units, as they stand on the command line: 1ms, 0.5 ms, 3kg, 20Ns/m.
+// Reads numbers with units from the command line: 1ms, 0.5 ms, 3kg, 20Ns/m.
 //
-// Where a number alone would be ambiguous (a duration: seconds? milliseconds?) the unit is required. All throw
-// SetupError naming `option`, which is what the user typed, such as "--timestep".
+// The unit is required if a number alone would be ambiguous, such as a duration's. All functions throw SetupError
+// naming `option`, the text that the user typed, such as "--timestep".
 #pragma once
 
 #include <string_view>

@@ -1,5 +1,5 @@
-// Random numbers that are the same on every machine and with every compiler: nothing of <random> but its engine, whose
-// output the standard defines. Published figures, tests and what `check` looks at depend on the sequence.
+// Random numbers that are equal on every machine and with every compiler. From <random> it uses only the engine, whose
+// output the standard defines. Published figures, tests and `check` depend on the sequence.
 //
 // One caller at a time. No allocation.
 #pragma once
@@ -15,11 +15,11 @@ class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}
 
-  // In [low, high): low + (high − low) u, with u of the engine's upper 53 bits.
+  // In [low, high): low + (high − low) u, with u from the engine's upper 53 bits.
   double uniform(double low, double high) {
     return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
   }
-  // Every decade between them equally often. Precondition: both above 0.
+  // Uniform in the logarithm. Precondition: both above 0.
   double log_uniform(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
   bool chance(double probability) { return uniform(0.0, 1.0) < probability; }
   // 0 to n − 1. Precondition: n > 0.
@@ -32,7 +32,7 @@ class Random {
     for (int i = 0; i < N; ++i) v[i] = uniform(-half, half);
     return v;
   }
-  // A unit vector, all directions alike: from points of the unit ball (rejection), none near its centre.
+  // A unit vector, uniform over all directions: from points in the unit ball (rejection), except near its centre.
   template <int N = 3>
   Eigen::Matrix<double, N, 1> direction() {
     for (;;) {
@@ -41,7 +41,8 @@ class Random {
       if (size > 0.1 && size <= 1.0) return v / size;
     }
   }
-  // A direction with a length; the length is drawn first (operands of one product are evaluated in no set order).
+  // A direction times a length. The length is drawn first, because the order in which a product's operands are
+  // evaluated is unspecified.
   Eigen::Vector3d arrow(double shortest, double longest) {
     const double length = uniform(shortest, longest);
     return length * direction();

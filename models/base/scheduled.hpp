@@ -1,4 +1,4 @@
-// A request of a script, when it is due, and what became of it.
+// A scripted request, its time, and its outcome.
 #pragma once
 
 #include <cstdint>
@@ -7,10 +7,10 @@ namespace proxarm::controller {
 
 template <typename T>
 struct Scheduled {
-  std::int64_t at_ns = 0;  // on the clock that whoever takes it names: since the first cycle, or of rendering
+  std::int64_t at_ns = 0;  // time since the first cycle, or since rendering began; the receiver of requests says which
   T request;
-  bool taken = false;             // its time came while the session ran
-  const char* refusal = nullptr;  // why it did nothing then
+  bool taken = false;             // due while the session ran
+  const char* refusal = nullptr;  // why it was refused; null: it wasn't
 };
 
 }  // namespace proxarm::controller

@@ -48,7 +48,7 @@ std::string in_quotes(std::string_view text, std::size_t max_bytes) {
     if (i >= max_bytes) return out + "...\"";
     const std::size_t length = utf8_length(text.substr(i));
     const auto byte = static_cast<unsigned char>(text[i]);
-    // Terminals obey U+0080..U+009F, too.
+    // U+0080..U+009F control terminals, too.
     const bool c1 = length == 2 && byte == 0xc2 && static_cast<unsigned char>(text[i + 1]) < 0xa0;
     if (length == 0 || byte < 0x20 || byte == 0x7f || c1) {
       constexpr std::string_view digits = "0123456789abcdef";

@@ -1,10 +1,10 @@
-// The one exception for set-up mistakes: a file, an option, a bus or a drive that isn't as it must be.
+// The exception for set-up mistakes: a file, an option, a bus or a drive that isn't as required.
 //
-// Says where (file, line, key; or bus, node, object), what was found, what is expected and what to do about it. what()
+// States the place (file, line, key; or bus, node, object), the value found, the value expected and what to do. what()
 // is one line, such as
 //   scenes/wall.yaml:12: objects[0].friction: found -0.3, expected a number from 0 to 10 (no unit)
 //   bus axes_1_3, node 2, object 1000h:00: found 0x00030191, expected 0x00020192; is another drive set to this node?
-// Thrown while things are set up, never from the cycle. The command line ends with exit status 2 on it.
+// Thrown only during set-up, never from the cycle. The command line then exits with status 2.
 #pragma once
 
 #include <stdexcept>
@@ -13,7 +13,7 @@
 
 namespace proxarm::description {
 
-// All fields may be empty; meant for designated initialisers: SetupError({.key = "--mass", .found = "-1", ...}).
+// All fields may be empty. Meant for designated initialisers: SetupError({.key = "--mass", .found = "-1", ...}).
 struct SetupProblem {
   std::string file{};      // as the user gave it
   int line = 0;            // from 1; 0: unknown
@@ -21,8 +21,8 @@ struct SetupProblem {
   std::string bus{};       // name in the cell, or interface
   int node = 0;            // CANopen node or Modbus unit; 0: none
   std::string object{};    // object of the node, such as "1000h:00 device type"
-  std::string key{};       // dotted path in the file, such as objects[0].friction; or the command line's option
-  std::string message{};   // a sentence, where found and expected don't say it
+  std::string key{};       // dotted path in the file, such as objects[0].friction; or an option of the command line
+  std::string message{};   // a sentence, if found and expected aren't enough
   std::string found{};     // value found
   std::string expected{};  // range or kind expected, with its unit
   std::string advice{};    // what to do
@@ -48,11 +48,11 @@ class SetupError : public std::runtime_error {
   SetupProblem problem_;
 };
 
-// Text from outside, made fit for one line of a message: control characters and broken UTF-8 as \xNN, at most
-// `max_bytes` long (then "..."), in double quotes.
+// Foreign text, made safe for one line of a message: control characters and broken UTF-8 as \xNN, at most `max_bytes`
+// long (then "..."), in double quotes.
 std::string in_quotes(std::string_view text, std::size_t max_bytes = 60);
 
-// A number as a person would write it: the shortest decimal that reads back the same.
+// The shortest decimal that reads back as the same number.
 std::string number_text(double value);
 
 }  // namespace proxarm::description

@@ -1,8 +1,8 @@
-// A queue between two threads that neither ever waits: one pushes (the cycle), one pops (whoever writes files).
+// A lock-free queue between two threads: one pushes (the cycle), one pops (a writer of files).
 //
-// Capacity is fixed at construction, which is the only allocation. push() of a full ring refuses and counts, so the
-// cycle never waits for a disk. The two indices live on cache lines of their own, and each side keeps a copy of the
-// other's index, so a push or a pop touches shared memory only when the copy says full or empty.
+// Only the constructor allocates. push() to a full ring drops the item and counts it, so the cycle never waits for a
+// disk. The two indices are on separate cache lines, and each side keeps a copy of the other's index. So push and pop
+// read the other's line only if the copy says full or empty.
 #pragma once
 
 #include <atomic>
@@ -26,7 +26,7 @@ class SpscRing {
   SpscRing(const SpscRing&) = delete;
   SpscRing& operator=(const SpscRing&) = delete;
 
-  // Producer only. False when full: the item is dropped and counted.
+  // Producer only. False if full: the item is dropped and counted.
   bool push(const T& item) noexcept {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail - head_seen_ == items_.size()) {
@@ -41,13 +41,13 @@ class SpscRing {
     return true;
   }
 
-  // Producer only: that many pushes succeed.
+  // Producer only: this many pushes will succeed.
   [[nodiscard]] std::size_t room() noexcept {
     head_seen_ = head_.load(std::memory_order_acquire);
     return items_.size() - (tail_.load(std::memory_order_relaxed) - head_seen_);
   }
 
-  // Consumer only. False when empty.
+  // Consumer only. False if empty.
   bool pop(T& item) noexcept {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head == tail_seen_) {
@@ -60,11 +60,11 @@ class SpscRing {
   }
 
   [[nodiscard]] std::size_t capacity() const noexcept { return items_.size(); }
-  // Any thread: how many items a full ring has refused.
+  // Any thread: the number of dropped items.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
  private:
-  // 64 bytes on every CPU that this runs on; std::hardware_destructive_interference_size isn't in clang 14.
+  // 64 bytes on all supported CPUs; clang 14 lacks std::hardware_destructive_interference_size.
   static constexpr std::size_t cache_line = 64;
 
   std::vector<T> items_;

@@ -1,9 +1,9 @@
-// All of an object that changes from cycle to cycle, as bytes: a black box writes them, a replay reads them back.
+// An object's state that changes from cycle to cycle, as bytes: a black box writes them, a replay reads them.
 //
-// A class names what changes in it once, for both directions:
+// A class names its changing members once, for both directions:
 //   void archive(StateArchive& state) noexcept { state(q_k1_, q_k2_, contacts_); }
-// Members are plain data, Eigen's vectors, or classes with an archive() of their own. Writing needs no heap. What is
-// read comes from a file that anybody may have made: sizes are checked, and whoever holds an index checks that.
+// Members are plain data, Eigen vectors, or classes with an archive() function. Writing needs no heap. Input comes from
+// untrusted files: sizes are checked here; owners of indices must check those.
 #pragma once
 
 #include <cstddef>
@@ -26,12 +26,12 @@ class StateArchive {
     (pass(members), ...);
   }
 
-  // Bytes as they are.
+  // Bytes unchanged.
   void raw(std::span<std::byte> bytes) noexcept { copy(bytes.data(), bytes.size()); }
 
   [[nodiscard]] bool reading() const noexcept { return in_ != nullptr; }
   [[nodiscard]] std::size_t bytes() const noexcept { return at_; }
-  // Nothing was missing: room when writing, bytes when reading.
+  // False if writing ran out of room or reading out of bytes.
   [[nodiscard]] bool whole() const noexcept { return !short_; }
 
  private:
@@ -43,7 +43,7 @@ class StateArchive {
       member.archive(*this);
     } else if constexpr (requires {
                            member.allFinite();
-                         }) {  // an Eigen vector or matrix; one of the joints keeps its size
+                         }) {  // an Eigen vector or matrix; a joint vector keeps its size
       copy(member.data(), sizeof(double) * static_cast<std::size_t>(member.size()));
     } else if constexpr (requires { member.coeffs().data(); }) {  // a quaternion
       copy(member.coeffs().data(), sizeof(double) * 4);

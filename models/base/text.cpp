@@ -15,7 +15,7 @@ std::size_t digits(std::string_view text) {
   return static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_digit) - text.begin());
 }
 
-// Edit distance with transpositions of neighbours; words are short, so the whole table is kept.
+// Edit distance with transpositions of neighbours. Words are short, so the whole table is kept.
 std::size_t distance(std::string_view a, std::string_view b) {
   const std::size_t columns = b.size() + 1;
   std::vector<std::size_t> table((a.size() + 1) * columns);
@@ -57,7 +57,7 @@ std::size_t utf8_length(std::string_view text) noexcept {
 std::optional<double> strict_number(std::string_view text) noexcept {
   std::string_view rest = text;
   if (!rest.empty() && (rest[0] == '+' || rest[0] == '-')) rest.remove_prefix(1);
-  if (text.starts_with('+')) text = rest;  // from_chars takes no plus
+  if (text.starts_with('+')) text = rest;  // from_chars accepts no plus
   const std::size_t whole = digits(rest);
   if (whole > 1 && rest[0] == '0') return std::nullopt;
   bool zero = whole == 0 || rest[0] == '0';
@@ -106,14 +106,14 @@ std::optional<std::int64_t> strict_integer(std::string_view text) noexcept {
 }
 
 std::string nearest(std::string_view word, std::span<const std::string> candidates) {
-  constexpr std::size_t longest = 80;  // nothing that long is a slip of the pen, and the table is quadratic
+  constexpr std::size_t longest = 80;  // longer words aren't typing errors, and the table is quadratic
   if (word.empty() || word.size() > longest) return {};
   std::string best;
   std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
   for (const std::string& candidate : candidates) {
     if (candidate.empty() || candidate.size() > longest) continue;
     std::size_t d = distance(word, candidate);
-    // The unit or the frame was forgotten, on either side.
+    // The unit or the frame is missing, on either side.
     if (candidate.starts_with(std::string(word) + "_") || word.starts_with(candidate + "_")) d = 1;
     const std::size_t cut = std::min(word.find('_'), word.size());
     if (cut > 2 && candidate.substr(0, cut + 1) == word.substr(0, cut + 1)) d = std::min<std::size_t>(d, 2);

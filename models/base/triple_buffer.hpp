@@ -1,5 +1,5 @@
-// The latest value from one thread to another: neither ever waits, and the reader may miss values but never sees half
-// of one. One writer, one reader.
+// Passes the latest value from one thread to another without waiting. The reader may miss values but never sees half of
+// one. One writer, one reader.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ class TripleBuffer {
     slots_[back_] = value;
     back_ = middle_.exchange(static_cast<std::uint8_t>(back_ | fresh), std::memory_order_acq_rel) & place;
   }
-  // False, and `out` as it was, where nothing has been written since the last read.
+  // False, with `out` unchanged, if nothing was written since the last read.
   bool read(T& out) noexcept {
     if ((middle_.load(std::memory_order_relaxed) & fresh) == 0) return false;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & place;

@@ -17,7 +17,7 @@ constexpr std::uint32_t extended_bit = 0x80000000U, unassigned_id = 0xC0000000U;
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 constexpr std::string_view unassigned_name = "VECTOR__INDEPENDENT_SIG_MSG";
 
-// What may follow a section whose ';' is missing.
+// Sections that may follow one whose ';' is missing.
 constexpr std::string_view known_sections[] = {"BO_",          "SG_",         "CM_",       "VAL_",
                                                "VAL_TABLE_",   "BA_",         "BA_DEF_",   "BA_DEF_DEF_",
                                                "SIG_VALTYPE_", "SG_MUL_VAL_", "BO_TX_BU_", "SIG_GROUP_"};
@@ -63,7 +63,7 @@ class Reader {
     rest_.remove_prefix(length);
   }
 
-  // Blanks, ends of lines, and comments from // to the end of a line, which some tools write.
+  // Blanks, ends of lines, and // comments, which some tools write.
   void skip_blanks() {
     for (;;) {
       if (rest_.starts_with("//")) rest_.remove_prefix(std::min(rest_.find('\n'), rest_.size()));
@@ -167,7 +167,7 @@ class Reader {
     skip_section(dbc, name);
   }
 
-  // To its ';'. One that isn't there swallows nothing of what follows.
+  // Skips to the section's ';'. If it is missing, stops at the next known section.
   void skip_section(DbcFile& dbc, const std::string& name) {
     while (token_.kind != Token::Kind::end && !at_sign(';') && !(first_in_line_ && begins_known_section())) advance();
     if (!at_sign(';')) {
@@ -183,7 +183,7 @@ class Reader {
   }
 
   // BA_ "SystemSignalLongSymbol" SG_ 256 Fx_of_the_sen "Fx_of_the_sensor_at_the_flange": a name that was cut to 32
-  // characters. The rest of it, and what isn't that, is for skip_section().
+  // characters. Leaves the rest, and any other BA_, to skip_section().
   void read_long_name(DbcFile& dbc) {
     if (token_.kind != Token::Kind::string) return;
     const bool of_signal = token_.text == "SystemSignalLongSymbol",
@@ -212,13 +212,13 @@ class Reader {
     }
   }
 
-  // The message that signals belong to.
+  // The message to which the next signals belong.
   DbcMessage* current(DbcFile& dbc) {
     if (in_unassigned_) return &unassigned_;
     return dbc.messages.empty() ? nullptr : &dbc.messages.back();
   }
 
-  // What can't be read is the current message's mistake. The reader goes on at the next line that begins a section.
+  // Notes an error with the current message, and continues at the next line that begins a section.
   template <typename Read>
   void read_or_note(DbcFile& dbc, Read read) {
     try {
@@ -245,7 +245,7 @@ class Reader {
     }
   }
 
-  // Their names, on one line or on many.
+  // Names of nodes, on one line or several.
   void skip_nodes(int line) {
     skip_line(line);
     while (token_.kind == Token::Kind::word && !(first_in_line_ && begins_section())) advance();
@@ -314,7 +314,7 @@ class Reader {
     sign(']');
     signal.unit = std::string(string("the unit, in quotes"));
     skip_receivers();
-    // Branches of a multiplexer may use a name again; none of them is a sensor's.
+    // Branches of a multiplexer may reuse a name; sensors don't use them.
     const DbcSignal* same = message.find(signal.name);
     if (same != nullptr && same->multiplexed && signal.multiplexed) return;
     if (same != nullptr) throw error("a signal that isn't there yet: " + signal.name);
@@ -322,7 +322,7 @@ class Reader {
     message.signals.push_back(std::move(signal));
   }
 
-  // With commas between, blanks, or none at all.
+  // Separated by commas, by blanks, or not at all.
   void skip_receivers() {
     bool goes_on = !first_in_line_;
     while (goes_on && (token_.kind == Token::Kind::word || at_sign(','))) {
@@ -332,8 +332,8 @@ class Reader {
     }
   }
 
-  // Intel: `start` is the lowest bit. Motorola: the highest, numbered as bit 7 .. 0 of byte 0, then bit 15 .. 8 of byte
-  // 1, and so on; the number goes on towards lower bits and then into the next byte.
+  // Intel: `start` is the lowest bit. Motorola: `start` is the highest bit, numbered bit 7 .. 0 of byte 0, then bit 15
+  // .. 8 of byte 1, and so on; the signal continues towards lower bits and then into the next byte.
   void place(const DbcMessage& message, DbcSignal& signal, int start, bool big_endian) const {
     NumberField& number = signal.number;
     number.big_endian = big_endian;
@@ -360,7 +360,7 @@ class Reader {
       for (DbcSignal& signal : message.signals) {
         if (signal.name != name || type == 0) continue;
         if (type == 1 && signal.length != 32) throw error("a float of 32 bits");
-        // Doubles and shifted floats can be read past, not used.
+        // Doubles are accepted here, but their 64 bits can't be used.
         if (type == 1) signal.number.kind = NumberKind::real;
         if (type == 2) signal.length = 64;
       }
@@ -373,7 +373,7 @@ class Reader {
   const std::filesystem::path& file_;
   Token token_;
   int line_ = 1;
-  bool first_in_line_ = false;  // token_ is
+  bool first_in_line_ = false;  // whether token_ is the first on its line
 };
 
 }  // namespace

@@ -1,12 +1,12 @@
-// Messages and signals of a DBC file, the automotive industry's format: where each number is in a frame, and its scale.
+// Reads messages and signals of a DBC file, the automotive industry's format: the place and scale of each number in a
+// frame.
 //
-// Of the format, what a sensor needs: BO_ (message), SG_ (signal), SIG_VALTYPE_ (float); other sections are skipped,
-// not judged. Debian 12 packages no DBC parser for C++, and this part of the format is a flat list of words: a small
-// strict reader is less than a grammar's library would bring along. What isn't of the format in a message or its
-// signals, a signal that doesn't fit its message, two messages or signals with one name: that message's mistake, with
-// the line, for whoever names it; the others can be used. Refused: a text that isn't of the format elsewhere, and files
-// above 4 MiB, 4096 messages, 512 signals in one. Nothing nests, so there is no depth to limit. The message that some
-// editors keep signals of no message in (identifier C0000000h, or by its name) is passed over.
+// Reads BO_ (message), SG_ (signal), SIG_VALTYPE_ (float) and long names in BA_; skips other sections unchecked. Debian
+// 12 packages no DBC parser for C++, and for this flat list of words a small strict reader is less code than a grammar
+// library. An error in a message or its signals (bad syntax, a signal that doesn't fit, a repeated name) is noted with
+// its line and reported only to users of that message. Refused: bad syntax elsewhere, and files above 4 MiB, 4096
+// messages, or 512 signals in a message. Skipped: the pseudo-message (identifier C0000000h, or by its name) in which
+// some editors keep unassigned signals.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +21,9 @@ namespace proxarm::description {
 
 struct DbcSignal {
   std::string name;
-  std::string long_name;  // that an editor cut to 32 characters; else empty
-  NumberField number;     // its first byte in its frame
-  int length = 0;         // bits as stated; more than 32 can be read past, but not used: then number.bits is 32
+  std::string long_name;  // the full name if an editor cut it to 32 characters; otherwise empty
+  NumberField number;     // bytes relative to its frame
+  int length = 0;         // bits as stated; a signal of more than 32 can't be used, and number.bits is then 32
   bool multiplexed = false;
   double factor = 1.0, offset = 0.0;
   std::string unit;
@@ -36,7 +36,7 @@ struct DbcMessage {
   std::uint8_t bytes = 0;
   int line = 0;
   std::vector<DbcSignal> signals;
-  std::string mistake;  // the first, with file and line; else empty
+  std::string mistake;  // the first error, with file and line; empty: none
 
   [[nodiscard]] const DbcSignal* find(std::string_view signal) const noexcept;
 };
@@ -44,12 +44,12 @@ struct DbcMessage {
 struct DbcFile {
   std::filesystem::path file;
   std::vector<DbcMessage> messages;
-  std::vector<std::string> remarks;  // mistakes of messages, a line each
+  std::vector<std::string> remarks;  // errors of messages, one per line
 
   [[nodiscard]] const DbcMessage* find(std::string_view message) const noexcept;
 };
 
-// `file` is for messages. Both throw SetupError.
+// `file` is for error messages. Both throw SetupError.
 [[nodiscard]] DbcFile parse_dbc(std::string_view text, const std::filesystem::path& file);
 [[nodiscard]] DbcFile load_dbc(const std::filesystem::path& file);
 

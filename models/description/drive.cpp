@@ -48,7 +48,7 @@ SimulatedDrive read_simulation(const YamlNode& node) {
   return s;
 }
 
-// Where the encoder is incremental, and only there.
+// Required for an incremental encoder, refused for an absolute one.
 std::optional<HomingDescription> read_homing(const YamlNode& node, const DriveDescription& drive) {
   // Drives on Modbus can't be homed from here.
   const bool incremental = (drive.on_can() ? node.choice_or("encoder", "absolute", {"absolute", "incremental"})
@@ -70,7 +70,7 @@ std::optional<HomingDescription> read_homing(const YamlNode& node, const DriveDe
   return homing;
 }
 
-// 607A and 6064 are 32-bit: the whole range must fit them.
+// 607Ah and 6064h have 32 bits: the whole range must fit them.
 void check_counts(const YamlNode& node, const DriveDescription& drive) {
   for (const double angle : drive.range_rad) {
     const double counts = drive.offset_counts + drive.counts_per_rad() * angle;
@@ -83,7 +83,7 @@ void check_counts(const YamlNode& node, const DriveDescription& drive) {
   }
 }
 
-// "0x60C1:02", or with sub-index 0 "0x607A".
+// "0x60C1:02", or "0x607A" for sub-index 0.
 std::uint32_t read_object(const YamlNode& node, const std::string& key) {
   const std::string text = text_like(node, key,
                                      {"0x[1-9A-Fa-f][0-9A-Fa-f]{3}(:[0-9A-Fa-f]{1,2})?",
@@ -119,7 +119,7 @@ std::vector<DriveFeedback> read_feedback(const YamlNode& node) {
   return feedback;
 }
 
-// A torque by its counts, or an angle by those of a second encoder.
+// A torque in counts, or an angle in counts of a second encoder.
 GearTorque read_gear_torque(const YamlNode& node) {
   GearTorque torque;
   torque.object = read_object(node, "object");
@@ -136,7 +136,7 @@ GearTorque read_gear_torque(const YamlNode& node) {
   return torque;
 }
 
-// Statusword, position and, with torques, the actual one come first.
+// TPDO1 begins with statusword, position and, in mode cst, the actual torque.
 void require_room_in_tpdo(const YamlNode& node, const DriveDescription& drive) {
   int bytes = drive.mode == "cst" ? 8 : 6;
   for (const DriveFeedback& more : drive.feedback) bytes += more.bits / 8;
@@ -164,7 +164,7 @@ std::vector<StartUpWrite> read_writes(const YamlNode& node) {
   return writes;
 }
 
-// The cycle must see the mode of a drive that shows it late.
+// If a drive shows its mode only when enabled, the cycle must read it.
 void require_mode_in_feedback(const YamlNode& node, const DriveDescription& drive) {
   const auto is_display = [&](const DriveFeedback& more) {
     return more.object == drive.objects.mode_display && more.bits == 8;
@@ -228,7 +228,7 @@ DriveDescription read_drive(const YamlNode& node) {
   d.profile = node.choice_or("profile", d.profile, {"cia402", "modbus"});
   d.node = static_cast<std::uint8_t>(node.integer("node", 1, d.on_can() ? 127 : 247));
   if (!d.on_can()) d.description = node.existing_file("description").string();
-  // A drive on Modbus takes positions.
+  // Modbus drives take positions only.
   d.mode =
       d.on_can() ? node.choice_or("mode", d.mode, {"csp", "ip", "cst"}) : node.choice_or("mode", d.mode, {"csp", "ip"});
   if (d.mode == "cst") {

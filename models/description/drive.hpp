@@ -1,4 +1,4 @@
-// The entries of a cell's `drives`, with what all of them share in its `drive_defaults` and `simulation_defaults`.
+// Reads the entries of a cell's `drives`, and their shared keys in `drive_defaults` and `simulation_defaults`.
 #pragma once
 
 #include <vector>
@@ -8,15 +8,14 @@
 
 namespace proxarm::description {
 
-// The entries in their order. A key that an entry doesn't have is looked for in `drive_defaults`, one that its
-// `simulation` doesn't have in `simulation_defaults`. Throws SetupError.
+// The entries in order. `drive_defaults` supplies keys that an entry lacks, `simulation_defaults` keys that its
+// `simulation` lacks. Throws SetupError.
 std::vector<YamlNode> drive_nodes(const YamlNode& root);
 
-// The same mistake, of a value that such an entry may have from one of these two: what is wrong for one drive may be
-// right for another, so the message names the drive.
+// Adds the drive's name to a mistake in a default value: a value that is wrong for one drive may be right for another.
 SetupError of_drive(const YamlNode& entry, const SetupError& mistake);
 
-// What such an entry says. Throws SetupError.
+// Reads one entry. Throws SetupError.
 DriveDescription read_drive(const YamlNode& node);
 
 }  // namespace proxarm::description

@@ -13,7 +13,7 @@ namespace {
 constexpr Range stiffness_range = between(0.0, 1e5), damping_range = between(0.0, 1e4);
 constexpr Range place_range = between(-100.0, 100.0), force_range = between(-1e4, 1e4);
 
-// `FILE.csv`, whose header has these names; or `{file: FILE.csv, columns: {x_m: px}}` for others.
+// `FILE.csv` with these names in its header, or `{file: FILE.csv, columns: {x_m: px}}` for other names.
 std::vector<TimedVector> read_data(const YamlNode& root, const char* key, CsvColumns columns, Range range,
                                    HandDescription& hand) {
   const YamlNode node = root.at(key);
@@ -44,7 +44,7 @@ void read_hand_data(const YamlNode& root, HandDescription& hand) {
 }
 constexpr Range turning_range = between(0.0, 1e4);
 
-// A hand that has no grip on the orientation would leave what it intends undone, without a word.
+// Without a grip on the orientation, the hand would silently ignore intended turns.
 void require_turning_grip(const YamlNode& root, const HandDescription& hand) {
   if (hand.twists()) return;
   const bool wanted = std::any_of(hand.waypoints.begin(), hand.waypoints.end(),

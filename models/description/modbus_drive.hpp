@@ -1,10 +1,10 @@
-// A Modbus drive's register map: which registers take a target, which tell position and status. A file under
-// models/drives; another make is another file.
+// A Modbus drive's register map: the registers of target, position and status. A file under models/drives; another make
+// needs only another file.
 //
-// The wire, every exchange, where the drive knows function 23 (read/write multiple registers), else functions 16 and 3:
-//   written  the block `command`, which starts at command_register: its values in order, of one or two registers each
-//   read     feedback_count registers from feedback_register; a status word outside of these is read by a further
-//            function 3, every status_every-th exchange
+// Each exchange uses function 23 (read/write multiple registers), or functions 16 and 3 if the drive doesn't have it:
+//   written  the block `command`, from command_register on: its values in order, one or two registers each
+//   read     feedback_count registers from feedback_register; a status word outside of these by another function 3,
+//            every status_every-th exchange
 // All registers are holding registers, numbered from 0 as on the wire.
 #pragma once
 
@@ -24,15 +24,15 @@ struct ModbusValue {
     constant,  // `value`
     position,  // target, counts · scale
     speed,     // feed-forward: |counts per second| · scale, at least `value`
-    control,   // control_on where the axis shall be driven, control_off where not
+    control,   // control_on if the axis shall be driven, otherwise control_off
   };
   Signal signal = Signal::constant;
   int registers = 2;       // 1 or 2
-  std::int64_t value = 0;  // constant; lowest speed
+  std::int64_t value = 0;  // constant, or lowest speed
   double scale = 1.0;      // register units per count or per count/s
 };
 
-// A value to be found in what is read: signed, one or two registers.
+// A value in the feedback: signed, one or two registers.
 struct ModbusField {
   std::uint16_t at = 0;  // register
   int registers = 2;
@@ -49,11 +49,11 @@ struct ModbusSetting {
 struct ModbusDriveDescription {
   std::filesystem::path file;
   std::string name;
-  bool high_word_first = true;  // of a value in two registers
+  bool high_word_first = true;  // of values in two registers
   bool function_23 = true;
-  double rate_Hz = 100.0;            // exchanges a second that the line tries to keep
+  double rate_Hz = 100.0;            // exchanges per second that the line aims at
   double response_timeout_s = 0.02;  // per exchange
-  double stale_after_s = 0.1;        // no answer for so long: the drive is lost
+  double stale_after_s = 0.1;        // without an answer for this long, the drive is lost
   std::uint16_t command_register = 0;
   std::vector<ModbusValue> command;
   std::int64_t control_on = 0, control_off = 0;
@@ -62,13 +62,13 @@ struct ModbusDriveDescription {
   ModbusField position;
   ModbusField status;
   int status_every = 1;
-  std::uint32_t ready_mask = 0, ready_value = 0;      // ready for operation where (status & mask) = value
-  std::uint32_t enabled_mask = 0, enabled_value = 0;  // driven
-  std::uint32_t fault_mask = 0;                       // fault where any of these is set
+  std::uint32_t ready_mask = 0, ready_value = 0;      // ready for operation if (status & mask) = value
+  std::uint32_t enabled_mask = 0, enabled_value = 0;  // driven if (status & mask) = value
+  std::uint32_t fault_mask = 0;                       // fault if any of these bits is set
   std::vector<ModbusSetting> settings;
 
   [[nodiscard]] int command_count() const noexcept;  // registers
-  [[nodiscard]] bool status_apart() const noexcept;  // not among the registers of the feedback
+  [[nodiscard]] bool status_apart() const noexcept;  // true: status isn't among the feedback's registers
 };
 
 // Throws SetupError, with file, line and key.

@@ -32,7 +32,7 @@ void require_limits(const YamlNode& limits, const CellLimits& given) {
   require_there(limits, "workspace_m", "the box that the tool stays in");
 }
 
-// A switch that is squeezed through ends the session: nobody clenches a hand for a pause.
+// A switch that is squeezed through ends the session: it is a reflex, not a wish to pause.
 void require_stop_when_squeezed(const YamlNode& root, const Cell& cell) {
   const auto chosen = cell.supervision.reactions.find("enabling_squeezed");
   if (chosen == cell.supervision.reactions.end() || chosen->second != "hold") return;

@@ -13,8 +13,8 @@ namespace {
 
 using Matrix = std::array<std::array<double, 6>, 6>;
 
-// Whether a 6×6 matrix can be inverted with something left of single precision: Gauss-Jordan inversion with partial
-// pivoting, then the condition number in the ∞-norm of the row-scaled matrix (rows differ by their units alone).
+// The condition number of a 6×6 matrix, to judge whether its inverse keeps digits of single precision: by Gauss-Jordan
+// inversion with partial pivoting, in the ∞-norm of the row-scaled matrix (rows differ only by their units).
 double condition(Matrix a) {
   Matrix inverse{};
   double norm = 0.0, inverse_norm = 0.0;

@@ -1,4 +1,5 @@
-// What a cell says of its own sensor beyond the sensor's file: identifiers, numbers, divisors and ranges of this unit.
+// A cell's choices for its own sensor, beyond the sensor's file: identifiers, numbers, divisors and ranges of this
+// unit.
 #pragma once
 
 #include <array>
@@ -10,7 +11,7 @@
 
 namespace proxarm::description {
 
-// One of the sensor's file's `settings` (sensor_protocol.hpp).
+// A value for one of the `settings` of the sensor's file (sensor_protocol.hpp).
 struct SensorSettingChoice {
   std::string name{};
   std::int64_t value = 0;
@@ -20,9 +21,9 @@ struct SensorSettingChoice {
 };
 
 struct SensorChoices {
-  std::filesystem::path file{};  // the cell's, for messages
+  std::filesystem::path file{};  // the cell's, for error messages
   std::vector<SensorSettingChoice> settings{};
-  std::optional<std::array<double, 3>> force_range_N{}, torque_range_Nm{};  // instead of the sensor's file's
+  std::optional<std::array<double, 3>> force_range_N{}, torque_range_Nm{};  // replace those of the sensor's file
 
   bool operator==(const SensorChoices&) const = default;
 };

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::array<const char*, 6> components{"fx", "fy", "fz", "tx", "ty", "tz"};
 
-// What a sensor's file leaves to the cell, with the cell's value or its default.
+// A value that a sensor's file leaves to the cell: the cell's value or the default.
 struct Setting {
   std::int64_t value = 0;
   bool is_identifier = false;
@@ -28,7 +28,7 @@ struct Reader {
   std::map<std::string, Setting> settings{};
   bool big_endian = true;
   std::optional<DbcFile> dbc{};
-  std::vector<const DbcMessage*> messages{};  // of the frames; null where a frame states its own
+  std::vector<const DbcMessage*> messages{};  // for each frame; null if the frame states its own identifier
 
   void read_settings() {
     if (const auto node = root.find_map("settings")) {
@@ -75,7 +75,7 @@ struct Reader {
     return settings.empty() || !node.is_scalar() ? settings.end() : settings.find(node.as_string());
   }
 
-  // A number, or the name of a setting.
+  // A number, or the value of the setting with this name.
   [[nodiscard]] std::int64_t number_of(const YamlNode& node, std::int64_t min, std::int64_t max) const {
     const auto named = setting_named(node);
     if (named == settings.end()) return node.as_integer(min, max);
@@ -85,7 +85,7 @@ struct Reader {
                      named->first + " = " + std::to_string(value));
   }
 
-  // Position and scale by the signal's name in the DBC file.
+  // The signal of this name in the DBC file; `at` becomes the first byte of its frame in the sample.
   [[nodiscard]] const DbcSignal* find_signal(const YamlNode& node, std::size_t& at) const {
     const std::string name = node.string("signal");
     at = 0;
@@ -119,7 +119,7 @@ struct Reader {
            "big_endian";
   }
 
-  // Reads where a number is; throws unless it lies within the first `within` bytes.
+  // Reads the place of a number. Throws unless it is within the first `within` bytes.
   [[nodiscard]] NumberField read_number(const YamlNode& node, std::size_t within) const {
     NumberField number;
     if (node.has("signal")) {
@@ -153,7 +153,7 @@ struct Reader {
     return number;
   }
 
-  // Two settings that are identifiers name different frames.
+  // Settings that are identifiers must differ.
   void note_identifier(const std::string& name) {
     Setting& setting = settings[name];
     setting.is_identifier = true;
@@ -251,7 +251,7 @@ struct Reader {
     return signal;
   }
 
-  // The registers count as one frame that is long enough; its identifier isn't used.
+  // The registers count as one frame that is long enough; its identifier is unused.
   void read_registers() {
     const YamlNode node = root.map("registers");
     SensorRegisters registers;
@@ -272,7 +272,7 @@ struct Reader {
     if (root.has("registers")) return read_registers();
     for (const YamlNode& node : root.list("frames", 1, max_sample_frames)) protocol.frames.push_back(read_frame(node));
     if (protocol.sample_bytes() > max_sample_bytes) throw root.error_at("frames", "up to 256 bytes in all");
-    // Two frames with the same identifier couldn't be told apart otherwise.
+    // Frames with the same identifier must differ in another way.
     for (std::size_t i = 1; i < protocol.frames.size(); ++i) {
       const SampleFrame &first = protocol.frames[0], &other = protocol.frames[i];
       if (first.id == other.id && first.bytes == other.bytes && first.starts_with.empty()) {
@@ -389,14 +389,14 @@ struct Reader {
       throw root.error_at("rate_Hz", "a rate whose code, divides_Hz / rate_Hz, is from 1 to " +
                                          number_text(protocol.rate->value->highest()));
     }
-    // A deviation of 1 % is that of a sensor's crystal; more is a mistake.
+    // A sensor's crystal deviates by up to 1 %; more is a mistake.
     if (std::abs(protocol.rate->divides_Hz / value - protocol.rate_Hz) > 0.01 * protocol.rate_Hz) {
       throw root.error_at("rate_Hz", "a rate that the sensor has: " + number_text(protocol.rate->divides_Hz / value) +
                                          " is the nearest");
     }
   }
 
-  // Bit j of a number lies `shift + j` bits above the lowest of its lowest byte.
+  // The bit of the sample that holds bit j of a number: `shift + j` bits above the lowest bit of its lowest byte.
   [[nodiscard]] static std::size_t bit_of(const NumberField& number, int j) {
     const auto above = static_cast<std::size_t>(number.shift + j);
     return 8 * (number.big_endian ? number.byte + number.bytes() - 1 - above / 8 : number.byte + above / 8) + above % 8;

@@ -1,8 +1,8 @@
-// Where a sensor's file has its identifiers, bytes, scales, states and commands from: for people, and for `proxarm
-// check`.
+// The sources of a sensor's file, from which its identifiers, bytes, scales, states and commands come. For readers and
+// `proxarm check`.
 //
 //   sources: ["the maker's manual, 1.82, page 9: identifiers and commands", ...]
-//   one_source_only: "the rate command: a driver of others alone"        what no second source was found for
+//   one_source_only: "the rate command: a driver of others alone"        facts without a second source
 #pragma once
 
 #include <string>
@@ -14,10 +14,10 @@ class YamlNode;
 
 struct SensorSources {
   std::vector<std::string> sources;
-  std::string one_source_only;  // empty: each figure is in two
+  std::string one_source_only;  // empty: each fact has two sources
 };
 
-// Throws SetupError. Of a file that says nothing, nothing.
+// Throws SetupError. Returns empty fields if the file has no such keys.
 SensorSources read_sensor_sources(const YamlNode& root);
 
 }  // namespace proxarm::description

@@ -1,11 +1,11 @@
-// Columns of numbers over time, as tools write them: a recorded motion, a recorded force.
+// Reads columns of numbers over time from CSV files: a recorded motion or force.
 //
-//   time_s,x_m,y_m,z_m        the header names the columns; others may stand between them
+//   time_s,x_m,y_m,z_m        the header names the columns; other columns may stand between them
 //   0,0,0,0
 //   0.01,0.0002,0,0
 //
-// Fields end at commas, semicolons or tabs, whichever the first line has. Empty lines and such that begin with '#' are
-// skipped, and so is a byte order mark. Whatever isn't a number is a mistake, with its line and column.
+// The separator is the semicolon, tab or comma found in the first line. Empty lines, lines that begin with '#' and a
+// byte order mark are skipped. Anything that isn't a number is a mistake, reported with line and column.
 #pragma once
 
 #include <array>
@@ -23,12 +23,11 @@ struct TimedVector {
   std::array<double, 3> value{};
 };
 
-// Which columns hold time, x, y and z: names of the header, or numbers from 1, as texts. With numbers alone, a file
-// needs no header.
+// The columns of time, x, y and z: names in the header, or numbers from 1, as texts. With only numbers, a file needs no
+// header.
 using CsvColumns = std::array<std::string, 4>;
 
-// Rows in the order of time, each after the one before, at least two and at most a million. Throws SetupError, with
-// file and line.
+// Rows with strictly increasing time, at least two and at most a million. Throws SetupError, with file and line.
 std::vector<TimedVector> load_csv(const std::filesystem::path& file, const CsvColumns& columns, Range range);
 std::vector<TimedVector> parse_csv(std::string_view text, const std::filesystem::path& file, const CsvColumns& columns,
                                    Range range);

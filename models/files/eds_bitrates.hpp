@@ -1,4 +1,4 @@
-// Which bitrates a device has by its EDS file: [DeviceInfo] BaudRate_10 to BaudRate_1000, in kbit/s (CiA 306-1).
+// The bitrates of a device according to its EDS file: [DeviceInfo] BaudRate_10 to BaudRate_1000, in kbit/s (CiA 306-1).
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,8 @@
 
 namespace proxarm::description {
 
-// Throws SetupError, with file and line, where the file says by any of these keys which bitrates there are, and this
-// one (bit/s) is none of them; and as parse_eds() for what is no number.
+// Throws SetupError, with file and line, if the file lists bitrates but not this one (bit/s). Also throws as
+// parse_eds() does for values that aren't numbers.
 void require_bitrate(std::string_view eds_text, const std::filesystem::path& file, std::int64_t bitrate);
 void require_bitrate(const std::filesystem::path& file, std::int64_t bitrate);
 

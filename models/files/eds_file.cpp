@@ -28,7 +28,7 @@ struct DataType {
   bool is_signed = false;
 };
 
-// By its number in CiA 301, table 44; of no bits where it isn't a number of 1 to 64 bits.
+// The type by its number in CiA 301, table 44; 0 bits if it isn't a number of 1 to 64 bits.
 DataType data_type(std::int64_t number) noexcept {
   constexpr DataType types[] = {{0x01, 1},        {0x02, 8, true},  {0x03, 16, true}, {0x04, 32, true}, {0x05, 8},
                                 {0x06, 16},       {0x07, 32},       {real32, 32},     {0x10, 24, true}, {0x11, 64},
@@ -40,8 +40,7 @@ DataType data_type(std::int64_t number) noexcept {
   return {};
 }
 
-// "$NODEID+0x180", in any case and order, with spaces or in brackets, for a node that is known: a sum in which $NODEID
-// comes once.
+// "$NODEID+0x180" for a known node, in any case and order, with spaces or in brackets: a sum with $NODEID exactly once.
 std::optional<std::int64_t> relative_value(const std::string& text, int node) {
   std::string sum = lower(text);
   std::erase_if(sum, [](unsigned char c) { return std::isspace(c) != 0; });
@@ -62,7 +61,7 @@ std::optional<std::int64_t> relative_value(const std::string& text, int node) {
   return nodes == 1 ? std::optional(total) : std::nullopt;
 }
 
-// A value of an object as its bits. Signed ones come as decimals, or as the bits of the type or of a wider one.
+// An object's value as bits. A signed value may be a decimal, or the bits of its type or of a wider one.
 std::optional<std::uint32_t> value_of(const IniFile& ini, const std::string& section, const std::string& key,
                                       const DataType& type, std::optional<int> node) {
   if (type.bits == 0 || type.bits > 32) return std::nullopt;
@@ -136,7 +135,7 @@ class Reader {
                           .message = keys.mistake});
       }
       const bool compound = !has_sub && (kind == array || kind == record);
-      if (compound && alike == 0) return;  // its sub-indices have sections of their own
+      if (compound && alike == 0) return;  // its sub-indices have separate sections
       read(object, section, kind);
     } catch (const SetupError& error) {
       object.mistake = error.what();
@@ -160,7 +159,7 @@ class Reader {
     const DataType type = data_type(number.value_or(0));
     object.type = type.number;
     object.bits = type.bits;
-    // What is set must be known, whatever else is wrong here.
+    // A value to be set must be readable, whatever else is wrong here.
     object.value = value_that_is_set(section, "ParameterValue", type);
     const std::string access = lower(ini_.text(section, "AccessType"));
     constexpr const char* known[] = {"ro", "wo", "rw", "rwr", "rww", "const"};
@@ -193,7 +192,7 @@ class Reader {
     }
   }
 
-  // Two equal ones are how some tools write that there are none.
+  // Some tools write two equal limits for "no limits".
   void read_limits(EdsObject& object, const std::string& section, const DataType& type) {
     if (type.number == real32) return;
     const auto limit = [&](const char* key) -> std::optional<std::int64_t> {
@@ -207,7 +206,7 @@ class Reader {
     if (object.low && object.high && *object.low >= *object.high) object.low = object.high = std::nullopt;
   }
 
-  // What a DCF sets. That it can't be read is no mistake of one object: the drive wouldn't be set as the file says.
+  // A value that a DCF sets. If it can't be read, the whole file fails: the drive wouldn't be set as the file says.
   std::optional<std::uint32_t> value_that_is_set(const std::string& section, const std::string& key,
                                                  const DataType& type) {
     try {

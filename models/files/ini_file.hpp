@@ -1,11 +1,9 @@
-// An INI text as EDS and DCF files are in fact written: sections and keys in any case, with the line of each, and kept
-// readable where a line is none of the format's.
+// Reads INI text as makers write EDS and DCF files: sections and keys in any case, each with its line. Invalid lines
+// don't make the rest unreadable.
 //
-// Not Boost's reader, which refuses the whole file for one free line under [Comments] or one key that comes twice, and
-// keeps no lines. A byte order mark is skipped; a line that begins with ';' or '#' is a comment, and so is what follows
-// a
-// ';' behind a number. Nothing is said of a file as such: whoever asks for a key or a section is told what is wrong
-// with it.
+// Boost's reader would refuse the whole file for one free line or one repeated key, and keeps no lines. Skipped are a
+// byte order mark, lines that begin with ';' or '#', and text from a ';' behind a number. Mistakes are reported only to
+// code that asks for the key or the section.
 #pragma once
 
 #include <cstdint>
@@ -21,20 +19,20 @@ namespace proxarm::description {
 
 class IniFile {
  public:
-  // Throws SetupError for more than 4 MB, and for a text without any section.
+  // Throws SetupError for text of more than 4 MB, in UTF-16, or with a value before the first section.
   IniFile(std::string_view text, const std::filesystem::path& file);
 
   struct Section {
     int line = 0;
-    std::map<std::string, std::string> values;  // by key; all in lower case
+    std::map<std::string, std::string> values;  // by key, in lower case
     std::map<std::string, int> lines;
-    std::string mistake;  // of the first line that can't be read, or a key that comes twice and differs; else empty
+    std::string mistake;  // the first unreadable line, or the first key repeated with another value; empty: none
     int mistake_line = 0;
   };
 
-  // By name, in lower case. One that comes twice is one.
+  // By name, in lower case. A repeated section continues the first.
   [[nodiscard]] const std::map<std::string, Section>& sections() const noexcept { return sections_; }
-  // "" if it isn't there.
+  // "" if missing.
   [[nodiscard]] std::string text(const std::string& section, const std::string& key) const;
   // nullopt if the value is missing, empty or relative to $NODEID. As in C: decimal, hexadecimal with 0x, octal with 0.
   [[nodiscard]] std::optional<std::int64_t> number(const std::string& section, const std::string& key, std::int64_t low,

@@ -1,5 +1,5 @@
-// JSON, written and read through a plain class. The library behind it (nlohmann's) is all templates: included, it costs
-// a source as long again as everything else that the source includes.
+// Writes and reads JSON through a plain class. It hides the library (nlohmann's), whose templates would double the
+// compile time of each source that includes them.
 #pragma once
 
 #include <concepts>
@@ -14,7 +14,7 @@
 
 namespace proxarm::description {
 
-// A value: null, a truth value, a number, a text, a list or an object whose keys keep their order.
+// A value: null, boolean, number, text, list, or an object whose keys keep their order.
 //
 //   Json json{{"cell", name}, {"stops", Json::array()}};
 //   json["stops"].push_back({{"time_s", 0.1}, {"at_rest", true}});
@@ -34,17 +34,16 @@ class Json {
   template <class T>
   Json(const std::vector<T>& values) : kind_(Kind::list), items_(values.begin(), values.end()) {}
 
-  // An object where each item is a pair whose first is a text; else a list.
+  // An object if every item is a pair that begins with a text; otherwise a list.
   Json(std::initializer_list<Json> items);
 
   static Json array() { return of_kind(Kind::list); }
   static Json object() { return of_kind(Kind::object); }
 
-  // The value of that key, made as null where there is none. Null becomes an object by it. Precondition: null or an
-  // object.
+  // The value of a key; a missing one is created as null. Turns null into an object. Precondition: null or an object.
   Json& operator[](std::string_view key);
 
-  // Null becomes a list by it. Precondition: null or a list.
+  // Turns null into a list. Precondition: null or a list.
   void push_back(Json value);
 
   // Precondition: a list that isn't empty.
@@ -53,18 +52,17 @@ class Json {
   // Precondition: both are objects.
   void update(const Json& other);
 
-  // On one line, or with that many spaces for each level. What isn't UTF-8 is replaced; numbers that aren't finite are
-  // null.
+  // The text on one line, or with `indent` spaces per level. Invalid UTF-8 is replaced; numbers that aren't finite
+  // become null.
   [[nodiscard]] std::string dump(int indent = -1) const;
 
-  // -- what was read --
-  // None where the text isn't JSON.
+  // nullopt if the text isn't JSON.
   static std::optional<Json> parse(std::string_view text);
 
-  // The value of that key; nullptr where there is none, or where this is no object.
+  // The value of a key; nullptr if it is missing or this isn't an object.
   [[nodiscard]] const Json* find(std::string_view key) const noexcept;
 
-  // The text, or the whole number, of that key; none where there is no such.
+  // The text, or whole number, of a key; nullopt if it is missing or of another kind.
   [[nodiscard]] std::optional<std::string> text_of(std::string_view key) const;
   [[nodiscard]] std::optional<std::int64_t> integer_of(std::string_view key) const noexcept;
 
@@ -72,7 +70,7 @@ class Json {
 
  private:
   enum class Kind : std::uint8_t { null, truth, integer, real, text, list, object };
-  friend struct JsonLibrary;  // json.cpp: to and from the library's own values
+  friend struct JsonLibrary;  // json.cpp: converts to and from the library's values
 
   static Json of_kind(Kind kind) {
     Json value;
@@ -85,7 +83,7 @@ class Json {
   std::int64_t integer_ = 0;
   double real_ = 0.0;
   std::string text_;
-  std::vector<std::string> keys_;  // of an object, one for each item
+  std::vector<std::string> keys_;  // of an object, one per item
   std::vector<Json> items_;
 };
 

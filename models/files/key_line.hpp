@@ -1,4 +1,4 @@
-// Where a key stands in a YAML file, for a mistake that shows only after the file has been read.
+// The line of a key in a YAML file, for mistakes found after the file was read.
 #pragma once
 
 #include <filesystem>
@@ -6,8 +6,8 @@
 
 namespace proxarm::description {
 
-// The line of a key, dotted from the root, or of the nearest one above it that is there; 0: none of them is.
-// Precondition: the file has been read without a mistake.
+// The line of a key, dotted from the root, or of its nearest existing parent; 0: none exists. Precondition: the file
+// has been read without a mistake.
 int line_of_key(const std::filesystem::path& file, const std::string& dotted);
 
 }  // namespace proxarm::description

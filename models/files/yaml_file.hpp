@@ -1,17 +1,16 @@
-// Strict reading of the YAML files that users write: every mistake is reported with file, line, key, found and
-// expected.
+// Strict reading of users' YAML files: every mistake is reported with file, line, key, found and expected.
 //
 //   const YamlNode root = YamlNode::load("scenes/wall.yaml");
-//   const double mass = root.number("mass_kg", above(0.0, 100.0));       // required; the unit is read off the key
+//   const double mass = root.number("mass_kg", above(0.0, 100.0));       // required; the key states the unit
 //   const double friction = root.number_or("friction", 0.0, between(0.0, 10.0));
 //   for (const YamlNode& object : root.list("objects", 1, 1000)) read_object(object);
 //   root.finish();                                                       // unknown keys anywhere below are mistakes
 //
-// Stricter than YAML, since files come from strangers and silence is worse than a message: refused are duplicate keys,
+// Stricter than YAML: files come from strangers, and silence is worse than a message. Refused are duplicate keys,
 // numbers with leading zeros (010), non-finite and hexadecimal reals, quoted numbers, anchors, aliases and tags, tabs
-// in the indentation, several documents, text that isn't UTF-8, control characters, files above 16 MiB, nesting above
-// 32 levels. All functions throw SetupError on what the user did wrong. A node is a cheap handle that keeps its file
-// alive.
+// in the indentation, several documents, text that isn't UTF-8, control characters, files above 16 MiB, and nesting
+// above 32 levels. All functions throw SetupError for mistakes of the user. A node is a cheap handle that keeps its
+// file alive.
 #pragma once
 
 #include <array>
@@ -29,11 +28,11 @@
 
 namespace proxarm::description {
 
-// Which numbers are allowed; bounds in the unit of the key.
+// Allowed numbers; bounds in the key's unit.
 struct Range {
   double min = std::numeric_limits<double>::lowest();
   double max = std::numeric_limits<double>::max();
-  bool above_min = false;  // min itself is not allowed
+  bool above_min = false;  // min itself isn't allowed
 
   [[nodiscard]] bool contains(double value) const noexcept {
     return (above_min ? value > min : value >= min) && value <= max;
@@ -44,30 +43,30 @@ constexpr Range between(double min, double max) { return {min, max, false}; }
 constexpr Range above(double min, double max = std::numeric_limits<double>::max()) { return {min, max, true}; }
 constexpr Range any_number() { return {}; }
 
-// The unit that a key's name states, as people write it: mass_kg → "kg", damping_Ns_per_m → "Ns/m"; empty if none.
+// The unit in a key's name, for messages: mass_kg → "kg", damping_Ns_per_m → "Ns/m"; empty if none.
 std::string unit_of_key(std::string_view key);
 
 class YamlNode {
  public:
-  // Reads a file. Messages name the file as given here; its relative paths are resolved against its own folder.
+  // Reads a file. Messages name it as given here; its relative paths are resolved against its folder.
   static YamlNode load(const std::filesystem::path& file);
-  // The same from text that is already in memory; `file` is for messages and relative paths.
+  // The same from text in memory; `file` is for messages and relative paths.
   static YamlNode parse(std::string_view text, const std::filesystem::path& file);
 
-  // Where this is. `path` is dotted from the root, such as objects[0].friction; empty for the root.
+  // The node's place. `path` is dotted from the root, such as objects[0].friction; empty for the root.
   [[nodiscard]] std::string path() const;
   [[nodiscard]] int line() const noexcept;
   [[nodiscard]] int column() const noexcept;
   [[nodiscard]] const std::filesystem::path& file() const noexcept;
-  // The key by which this is called in its map; empty for elements of lists and for the root.
+  // The node's key in its map; empty for list elements and the root.
   [[nodiscard]] const std::string& name() const noexcept;
 
   [[nodiscard]] bool is_map() const noexcept;
   [[nodiscard]] bool is_list() const noexcept;
   [[nodiscard]] bool is_scalar() const noexcept;
 
-  // A map's entries. Each call makes the key known to finish(); asking for a key of what isn't a map is a mistake
-  // of the file. An entry without a value (`key:`) counts as a mistake, not as absent.
+  // A map's entries. Each call marks the key as known for finish(). If the node isn't a map, this is reported as a
+  // mistake in the file. An entry without a value (`key:`) is a mistake, not absent.
   [[nodiscard]] bool has(std::string_view key) const;
   [[nodiscard]] YamlNode at(std::string_view key) const;  // required
   [[nodiscard]] std::optional<YamlNode> find(std::string_view key) const;
@@ -75,7 +74,7 @@ class YamlNode {
   [[nodiscard]] std::optional<YamlNode> find_map(std::string_view key) const;
   [[nodiscard]] std::vector<YamlNode> list(std::string_view key, std::size_t min_size = 0,
                                            std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
-  // Keys in the order of the file, for maps whose keys are names that the user chooses; makes all of them known.
+  // The keys in the file's order, for maps with keys chosen by the user; marks all of them as known.
   [[nodiscard]] std::vector<std::string> keys() const;
 
   [[nodiscard]] double number(std::string_view key, Range range) const;
@@ -98,19 +97,19 @@ class YamlNode {
                                               Range range = any_number()) const;
   [[nodiscard]] std::vector<double> numbers(std::string_view key, std::size_t min_size, std::size_t max_size,
                                             Range range = any_number()) const;
-  // A path, absolute or relative to the file's folder, made absolute. Whether it exists is not looked at...
+  // A path, absolute or relative to the file's folder, made absolute. Its existence isn't checked.
   [[nodiscard]] std::filesystem::path path_of(std::string_view key) const;
-  // ... or must be a readable file.
+  // The same, for a file that must be readable.
   [[nodiscard]] std::filesystem::path existing_file(std::string_view key) const;
 
-  // From now on the keys that this map doesn't have are those of `defaults`, a map of the same file; of a map that both
-  // have, key by key. Errors name the place where a value stands. Keys that are asked of this map are known to finish()
-  // in `defaults`, too. Nothing happens where this is no map.
+  // From now on, `defaults`, a map of the same file, supplies keys that this map lacks; in maps that both have, key by
+  // key. Errors name the value's own place. Keys asked of this map count as known in `defaults`, too. Does nothing
+  // unless this is a map.
   void default_to(const YamlNode& defaults) const;
-  // The same for the map behind that key, which is an empty one from now on where it isn't there.
+  // The same for the map under that key, which is created empty if missing.
   void default_to(std::string_view key, const YamlNode& defaults) const;
 
-  // This node itself, for elements of lists.
+  // The node's own value, for list elements.
   [[nodiscard]] double as_number(Range range = any_number()) const;
   [[nodiscard]] std::int64_t as_integer(std::int64_t min, std::int64_t max) const;
   [[nodiscard]] bool as_boolean() const;
@@ -122,12 +121,11 @@ class YamlNode {
   [[nodiscard]] std::vector<YamlNode> as_list(std::size_t min_size = 0,
                                               std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
 
-  // Throws on the first key, here or anywhere below, that nobody has asked for; names the nearest known key, or the map
-  // beside or within that one of which it is a key.
-  // Call it on the root when all has been read.
+  // Throws for the first key, here or below, that was never asked for. Names the nearest known key, or a neighbouring
+  // or inner map to which the key belongs. Call it on the root after reading.
   void finish() const;
 
-  // For a check of one's own: the error for this node. `found` defaults to the node's own text.
+  // The error for this node, for a caller's own check. `found` defaults to the node's text.
   [[nodiscard]] SetupError error(std::string expected, std::string found = {}, std::string advice = {}) const;
   // The same for an entry of this map, present or not.
   [[nodiscard]] SetupError error_at(std::string_view key, std::string expected, std::string found = {},
@@ -139,7 +137,7 @@ class YamlNode {
   class Builder;
 
   YamlNode(std::shared_ptr<const Document> document, const Item& item) : document_(std::move(document)), item_(&item) {}
-  [[nodiscard]] const Item* child(std::string_view key) const;  // null if there is none
+  [[nodiscard]] const Item* child(std::string_view key) const;  // null if missing
   [[nodiscard]] std::string found() const;
   [[nodiscard]] SetupError unknown(const Item& item) const;
   [[nodiscard]] SetupError missing(std::string_view key, std::string expected) const;

@@ -1,4 +1,4 @@
-// A key put into the text of a YAML file, with all else of it as it was: comments, order, empty lines.
+// Inserts a key into the text of a YAML file and leaves everything else unchanged: comments, order, empty lines.
 #pragma once
 
 #include <string>
@@ -6,19 +6,19 @@
 
 namespace proxarm::description {
 
-// A key, or the `name` key of a list's member and what it has there: {"drives"}, {"joint", "axis_1"}.
+// A step of a path: a key, or the list member with this value of this key: {"drives"}, {"joint", "axis_1"}.
 struct YamlStep {
   std::string key;
-  std::string is{};  // empty: the map behind `key`
+  std::string is{};  // empty: the map under `key`
 };
 
-// Puts `key: value` into the map at the end of `path`, from the file's outermost one. In a map of lines it comes behind
-// the last key that has a plain value on its own line; in one in braces behind the first. False, and nothing changed,
-// where there is no such map, it has the key, or it has no such line.
+// Inserts `key: value` into the map at the end of `path`, which begins at the file's outermost map. In a block map the
+// key goes after the last key with a plain value on its line; in a map in braces after the first key. Returns false and
+// changes nothing if there is no such map or line, or if the map has the key.
 [[nodiscard]] bool insert_key(std::string& text, const std::vector<YamlStep>& path, const std::string& key,
                               const std::string& value);
 
-// Whether there is such a map and it has the key.
+// Whether such a map exists and has the key.
 [[nodiscard]] bool has_key(const std::string& text, const std::vector<YamlStep>& path, const std::string& key);
 
 }  // namespace proxarm::description

@@ -1,6 +1,6 @@
-// Who listens to what a reader asks of a YAML file: each key with its kind, unit, range and default. The calls by which
-// a reader reads (yaml_file.hpp, yaml_rules.hpp) are the one place of these facts; schemas and reference tables are
-// made of what a listener hears while specimen files are read (`proxarm schema`).
+// Records what readers ask of a YAML file: each key with its kind, unit, range and default. These facts exist only in
+// the reading calls (yaml_file.hpp, yaml_rules.hpp). `proxarm schema` makes schemas and reference tables from what a
+// journal records while example files are read.
 #pragma once
 
 #include <cstddef>
@@ -18,13 +18,13 @@ namespace proxarm::description {
 
 struct YamlFact {
   enum class Kind : std::uint8_t {
-    asked,        // whether it is there
-    required,     // it must be there
-    needed,       // the same, because of what else the file says
-    refused,      // it must not be there, because of that
-    otherwise,    // what it is without the key
+    asked,        // the reader asks whether the key is there
+    required,     // required
+    needed,       // required because of other values in the file
+    refused,      // refused because of other values in the file
+    otherwise,    // the default without the key
     map,          // a map ...
-    names,        // ... whose keys are names that the user chooses, like `pattern` if that isn't empty
+    names,        // a map with keys chosen by the user, matching `pattern` if that isn't empty
     exactly_one,  // a map that must have exactly one of `choices` as its keys
     list,
     numbers,
@@ -34,10 +34,10 @@ struct YamlFact {
     text,
     path,
     choice,
-    // What narrows a kind:
-    values,   // of an integer: these alone
-    pattern,  // of a text, a regular expression
-    zero,     // of a number: 0 as well, below its range
+    // Restrictions of a kind:
+    values,   // an integer out of these only
+    pattern,  // a text that matches this regular expression
+    zero,     // a number that may also be 0, below its range
   };
 
   Kind kind;
@@ -45,7 +45,7 @@ struct YamlFact {
   std::size_t min_size = 0, max_size = std::numeric_limits<std::size_t>::max();
   std::vector<std::string> choices{};
   std::vector<std::int64_t> values{};
-  std::string pattern{}, means{};  // the latter in words
+  std::string pattern{}, means{};  // means: the pattern in words
   Json otherwise{};
 };
 
@@ -56,11 +56,12 @@ class YamlJournal {
   YamlJournal& operator=(const YamlJournal&) = delete;
   virtual ~YamlJournal() = default;
 
-  // Of the entry `key` of `parent`, which may be absent; or of an element of the list `parent`, without a key.
+  // A fact about the entry `key` of `parent`, which may be absent; or, without a key, about an element of the list
+  // `parent`.
   virtual void note(const YamlNode& parent, std::string_view key, const YamlFact& fact) = 0;
 };
 
-// Files that this thread reads while it lives are heard by `journal`. One at a time.
+// While it exists, `journal` records the files that this thread reads. One at a time.
 class YamlListening {
  public:
   explicit YamlListening(YamlJournal& journal) noexcept;
@@ -69,10 +70,10 @@ class YamlListening {
   ~YamlListening();
 };
 
-// Tells the journal that listens, if one does.
+// Passes a fact to the active journal, if any.
 void note(const YamlNode& parent, std::string_view key, const YamlFact& fact);
 
-// Whether one does: who would have to copy much for a note asks first.
+// Whether a journal is active; saves copying for a note without one.
 bool is_heard() noexcept;
 
 }  // namespace proxarm::description

@@ -1,6 +1,5 @@
-// Bytes to tree: size, encoding and tabs are checked here, structure by yaml-cpp, and its events become Items. Working
-// on events rather than on yaml-cpp's own nodes shows duplicate keys, anchors and depth before anything is built of
-// them.
+// Builds the tree of a YAML text. Checks size, encoding and tabs; yaml-cpp parses the structure, and its events become
+// Items. Events, unlike yaml-cpp's nodes, reveal duplicate keys, anchors and depth before anything is built from them.
 #include "models/files/yaml_tree.hpp"
 
 #include <fcntl.h>
@@ -24,16 +23,16 @@ namespace proxarm::description {
 namespace {
 
 constexpr std::size_t max_bytes = 16U << 20U;
-constexpr auto patience_with_pipes = std::chrono::seconds(2);  // for all of it
+constexpr auto patience_with_pipes = std::chrono::seconds(2);  // in total
 constexpr std::size_t max_depth = 32;
 constexpr std::size_t max_key_bytes = 100;
 constexpr std::size_t max_keys =
-    1000;  // of one map; files have some dozens. Look-ups are linear, so more would be slow
+    1000;  // in one map; files have some dozens. Look-ups are linear, so more would be slow
 
-constexpr std::size_t max_values = 500'000;  // of a file; that many are a tree of about 100 MB
+constexpr std::size_t max_values = 500'000;  // in a file; this many make a tree of about 100 MB
 
-// yaml-cpp takes the end of the file for the end of a quote that was never closed. A last line of our own reveals that:
-// it is a comment to YAML, unless an open quote swallows it.
+// yaml-cpp takes the end of the file as the end of an unclosed quote. This extra last line reveals that: to YAML it is
+// a comment, unless an open quote swallows it.
 constexpr std::string_view last_line = "\n# end of file, unless in quotes: 5bd0d7a1\n";
 constexpr std::string_view last_words = "5bd0d7a1";
 
@@ -46,8 +45,7 @@ SetupError mistake(const std::filesystem::path& file, int line, int column, std:
                      .advice = std::move(advice)});
 }
 
-// Brackets open at once in flow style ([[[…); yaml-cpp looks ahead through all of them before its first event, so the
-// depth must be bounded before it starts. Quotes and comments are followed only as far as that takes.
+// Checks encoding, indentation and control characters.
 void check_text(std::string_view text, const std::filesystem::path& file) {
   int line = 1, column = 1;
   bool indentation = true;
@@ -66,9 +64,11 @@ void check_text(std::string_view text, const std::filesystem::path& file) {
   }
 }
 
+// Bounds runs of opening brackets ([[[…): yaml-cpp looks ahead through a whole run before its first event. Counts
+// brackets in quotes and comments, too.
 void check_brackets(std::string_view text, const std::filesystem::path& file) {
   int line = 1;
-  std::size_t run = 0;  // opening brackets and indicators in a row, blanks between them not counted
+  std::size_t run = 0;  // opening brackets and indicators in a row, ignoring blanks
   for (const char c : text) {
     if (c == '\n') ++line;
     if (c == '[' || c == '{') {
@@ -80,7 +80,7 @@ void check_brackets(std::string_view text, const std::filesystem::path& file) {
   }
 }
 
-// A pipe, such as a shell's <(...), whose other end may be silent, or not there at all.
+// Reads a pipe, such as a shell's <(...). Its writer may be silent or missing.
 std::string read_pipe(const std::filesystem::path& file) {
   using Clock = std::chrono::steady_clock;
   const auto give_up = Clock::now() + patience_with_pipes;
@@ -92,7 +92,7 @@ std::string read_pipe(const std::filesystem::path& file) {
     const ssize_t n = ::read(descriptor, block.data(), block.size());
     if (n > 0) text.append(block.data(), static_cast<std::size_t>(n));
     if (n > 0) continue;
-    // A named pipe that nobody has opened for writing yet is at its end, too.
+    // A named pipe without a writer yet also reads as ended.
     const bool may_begin = n == 0 && text.empty() && std::filesystem::is_fifo(file);
     if (!may_begin && (n == 0 || (errno != EAGAIN && errno != EINTR))) break;
     if (Clock::now() < give_up) {
@@ -191,7 +191,7 @@ class YamlNode::Builder : public YAML::EventHandler {
   struct Level {
     Item* item;
     std::unordered_set<std::string> keys{};
-    bool has_key = false;  // a key has come, its value not yet
+    bool has_key = false;  // a key without its value yet
     std::string key{};
     YAML::Mark key_mark{};
   };
@@ -244,7 +244,7 @@ class YamlNode::Builder : public YAML::EventHandler {
       item.key_line = level.key_mark.line + 1;
       item.key_column = level.key_mark.column + 1;
       level.has_key = false;
-      if (kind == Item::Kind::null) {  // yaml-cpp marks an absent value at the next token
+      if (kind == Item::Kind::null) {  // yaml-cpp puts an absent value at the next token
         item.line = item.key_line;
         item.column = item.key_column;
       }

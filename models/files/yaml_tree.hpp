@@ -22,11 +22,11 @@ struct YamlNode::Item {
   std::size_t index = 0;                                   // in the parent's list
   int line = 0, column = 0, key_line = 0, key_column = 0;  // from 1
   const Item* parent = nullptr;
-  mutable std::vector<Item*> children;     // an empty map is added where a reader wants defaults for it
-  mutable const Item* defaults = nullptr;  // a map with the keys that this one doesn't have
+  mutable std::vector<Item*> children;     // an empty map is added if a reader sets defaults for it
+  mutable const Item* defaults = nullptr;  // a map that supplies missing keys
   mutable std::vector<std::string> asked;  // keys that a reader has asked for
 
-  // The key that names this value: its own, or for elements of lists that of the list.
+  // The key that names this value: its key, or for list elements the list's key.
   [[nodiscard]] std::string_view named() const noexcept {
     const Item* item = this;
     while (item->key.empty() && item->parent != nullptr) item = item->parent;
@@ -46,7 +46,7 @@ struct YamlNode::Item {
 
   [[nodiscard]] const Item* map_with(std::string_view wanted) const;
 
-  // Of a key's own line; 0: it isn't there.
+  // The line of a key in this map itself; 0: missing.
   [[nodiscard]] int line_of(std::string_view wanted) const noexcept {
     const Item* item = own(wanted);
     return item != nullptr ? item->key_line : 0;
@@ -62,7 +62,7 @@ struct YamlNode::Document {
   mutable std::deque<Item> items;  // stable addresses; the first is the root
 };
 
-// Why `text` is no number, where that isn't obvious.
+// Why `text` isn't a number, if that isn't obvious.
 std::string number_advice(std::string_view text);
 
 }  // namespace proxarm::description

@@ -8,8 +8,8 @@
 //                                          │
 //                                     W ───┘
 //
-// A vector's suffix names the frame that it is expressed in (force_S); X_WT is the pose of T in W, and poses read left
-// to right: X_WT = X_WB · X_BT.
+// A vector's suffix names the frame in which it is expressed (force_S). X_WT is the pose of T in W. Poses read left to
+// right: X_WT = X_WB · X_BT.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,7 +23,7 @@ using Vec3 = Vec<3>;
 using Mat3 = Eigen::Matrix3d;
 using Pose = Eigen::Isometry3d;
 
-// Coordinates of a space of N dimensions as a vector of three; the others are zero.
+// A vector of N dimensions as one of three; the missing coordinates become zero.
 template <int N>
 Vec3 lift(const Vec<N>& x) noexcept {
   Vec3 x3 = Vec3::Zero();
@@ -31,7 +31,7 @@ Vec3 lift(const Vec<N>& x) noexcept {
   return x3;
 }
 
-// Force and torque about the origin of the frame they are expressed in; N and Nm.
+// Force (N) and torque (Nm) about the origin of the frame in which they are expressed.
 struct Wrench {
   Vec3 force = Vec3::Zero();
   Vec3 torque = Vec3::Zero();

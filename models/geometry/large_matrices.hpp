@@ -1,6 +1,5 @@
-// Products, inverses and linear systems of matrices of any size, which allocate: for what is computed before a session.
-// Eigen's forms of these are blocked for large matrices and compiled anew, for seconds, in every source that writes
-// them: whoever needs them asks here. The numbers are Eigen's to the bit.
+// Products, inverses and linear systems of matrices of any size, for work before a session: they allocate. Eigen would
+// compile its blocked forms anew, for seconds, in every source that uses one. Results equal Eigen's to the bit.
 #pragma once
 
 #include "models/geometry/geometry.hpp"
@@ -11,9 +10,9 @@ namespace proxarm::models {
 Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 // Aᵀ B. Precondition: A has as many rows as B.
 Eigen::MatrixXd transposed_product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
-// A⁻¹ by partial pivoting. A singular A gives results that aren't finite.
+// A⁻¹ by partial pivoting. The result isn't finite if A is singular.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& A);
-// A⁻¹ B by Cholesky's decomposition. Precondition: A is symmetric and positive definite.
+// A⁻¹ B by Cholesky decomposition. Precondition: A is symmetric and positive definite.
 Eigen::MatrixXd solve_positive_definite(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 
 }  // namespace proxarm::models

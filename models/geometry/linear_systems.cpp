@@ -6,7 +6,7 @@
 
 namespace proxarm::models {
 
-// Column k of L and row k of U. The loops' bounds are constants, so that they are unrolled.
+// Computes column k of L and row k of U. Template recursion makes the loop bounds constant, so that they are unrolled.
 template <int k>
 void FactoredMatrix::eliminate() noexcept {
   int pivot = k;
@@ -58,8 +58,8 @@ std::optional<Mat6> inverse_if_regular(const Mat6& A) noexcept {
   return lu.inverse();
 }
 
-// As ColPivHouseholderQR::solve() does it. Its householderQ() would bring the form along that is blocked for more than
-// 48 rows, and with it all of Eigen's large products.
+// The algorithm of ColPivHouseholderQR::solve(), without its householderQ(): that would compile a form that is blocked
+// for more than 48 rows, and with it all of Eigen's large products.
 Unknowns solve_least_squares(const Equations& A, const Unknowns& b) noexcept {
   const Eigen::ColPivHouseholderQR<Equations> qr(A);
   const Eigen::Index rank = qr.nonzeroPivots();

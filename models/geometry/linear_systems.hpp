@@ -1,5 +1,5 @@
-// A x = b for the sizes that the cycle solves. Eigen's decompositions are blocked for large matrices and compiled anew,
-// for seconds, in every source that asks for one: whoever needs them asks here. None of these allocates.
+// Linear systems A x = b of the sizes that the cycle solves. Nothing here allocates. Eigen would compile its
+// decompositions anew, for seconds, in every source that uses one.
 #pragma once
 
 #include <Eigen/LU>
@@ -11,13 +11,13 @@
 
 namespace proxarm::models {
 
-// By Cholesky's decomposition. Precondition: A is symmetric and positive definite.
+// A⁻¹ B by Cholesky decomposition. Precondition: A is symmetric and positive definite.
 Eigen::Matrix<double, 6, 3> solve_positive_definite(const Mat6& A, const Eigen::Matrix<double, 6, 3>& B) noexcept;
 SmallColumns3 solve_positive_definite(const SmallMatrix& A, const SmallColumns3& B) noexcept;
 SmallMatrix solve_positive_definite(const SmallMatrix& A, const SmallMatrix& B) noexcept;
 
-// P A = L U with partial pivoting. A singular A gives results that aren't finite. The factors are those of
-// Eigen::PartialPivLU to the bit, in a sixth of its instructions: that one is written for matrices of any size.
+// P A = L U with partial pivoting. Results aren't finite if A is singular. The factors equal those of
+// Eigen::PartialPivLU to the bit, at a sixth of its instructions, because the size is fixed.
 class FactoredMatrix {
  public:
   void factor(const Mat6& A) noexcept;
@@ -30,20 +30,20 @@ class FactoredMatrix {
   template <typename Columns>
   [[nodiscard]] Columns solve_columns(const Columns& B) const noexcept;
 
-  Mat6 lu_ = Mat6::Identity();                 // U, and below its diagonal L without its ones
-  std::array<int, 6> rows_{0, 1, 2, 3, 4, 5};  // of A, in the order of L U
+  Mat6 lu_ = Mat6::Identity();                 // U, and below its diagonal L without the ones on L's diagonal
+  std::array<int, 6> rows_{0, 1, 2, 3, 4, 5};  // row i of L U is row rows_[i] of A
 };
 
-// The same in one go, for N = 6 and 9.
+// A⁻¹ b with partial pivoting, for N = 6 and 9.
 template <int N>
 Vec<N> solve_square(const Eigen::Matrix<double, N, N>& A, const Vec<N>& b) noexcept;
 extern template Vec<6> solve_square<6>(const Mat6& A, const Vec<6>& b) noexcept;
 extern template Vec<9> solve_square<9>(const Eigen::Matrix<double, 9, 9>& A, const Vec<9>& b) noexcept;
 
-// A⁻¹ by full pivoting, or none if A has not full rank.
+// A⁻¹ by full pivoting, or nullopt if A is singular.
 std::optional<Mat6> inverse_if_regular(const Mat6& A) noexcept;
 
-// A x = b in the sense of least squares, by QR with column pivoting; A may be singular. Up to 36 rows.
+// The least-squares solution of A x = b for up to 36 rows, by QR with column pivoting; A may be singular.
 constexpr int most_equations = 36;
 using Equations =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most_equations, most_equations>;

@@ -6,15 +6,13 @@
 namespace proxarm::models {
 namespace {
 
-// Sine of the angle to the active rows below which a row counts as dependent on them: their QR has lost all digits
-// there.
+// A row whose angle to the active rows' span has a smaller sine counts as dependent: their QR has no digits left there.
 constexpr double dependent = 1e-10;
-// By which a row may be missed, relative to the size of what is multiplied in it: some dozen roundings.
+// A row may be missed by this, relative to the size of its factors: some dozen roundings.
 constexpr double rounding = 1e-14;
-// By which a solution may miss a row, relative to its bound: what is left of the digits where active rows are nearly
-// parallel.
+// A solution may miss a row by this, relative to the row's bound. Nearly parallel active rows leave no more digits.
 constexpr double held = 1e-6;
-constexpr int most_exchanges = 100;  // about three are usual; the method is finite, rounding isn't
+constexpr int most_exchanges = 100;  // about three are usual; the method itself ends, but rounding can make it cycle
 
 }  // namespace
 
@@ -71,7 +69,7 @@ void NearestInPolyhedron::equal(const SmallVector& e, double f) noexcept {
 
 void NearestInPolyhedron::at_most(const SmallVector& a, double b) noexcept { add(a, b); }
 
-// The normals are the columns of L⁻¹ and their negatives.
+// The columns of L⁻¹ and their negatives are the normals.
 void NearestInPolyhedron::within(const SmallVector& low, const SmallVector& high) noexcept {
   const Eigen::Index size = u0_.size();
   for (Eigen::Index i = 0; i < size; ++i) {
@@ -184,7 +182,7 @@ bool NearestInPolyhedron::solve() noexcept {
   return feasible && holds();
 }
 
-// Rows that are nearly parallel lose digits, and exchanges may not have ended.
+// Checks all rows at the end: nearly parallel rows lose digits, and the exchanges may have run out.
 bool NearestInPolyhedron::holds() const noexcept {
   for (std::size_t i = 0; i < count_; ++i) {
     const double along = normal_[i].dot(v_), beyond = along - bound_[i];

@@ -1,4 +1,4 @@
-// How an object moves by itself.
+// The motion of an object that moves by a fixed script, as a function of time.
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,8 @@
 
 namespace proxarm::models {
 
-// A scripted motion, relative to where the object was described: a turn about a point, a shift and a swing.
+// A scripted motion, relative to the place where the scene describes the object: a turn about a point, a shift and a
+// swing.
 //   x(t) = c + R(ω t) (x − c) + v t + a sin(2π f t + φ)
 struct ScriptedMotion {
   Vec3 velocity_m_per_s = Vec3::Zero();
@@ -29,7 +30,7 @@ struct ScriptedMotion {
   }
 };
 
-// Gram–Schmidt orthonormalisation, twice. A rotation that is orthonormal within rounding stays as it is.
+// Gram–Schmidt orthonormalisation in two passes. Returns X itself if its rotation is orthonormal within rounding.
 inline Pose orthonormalised(Pose X) noexcept {
   auto R = X.linear();
   const double off = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff();
@@ -42,7 +43,7 @@ inline Pose orthonormalised(Pose X) noexcept {
   return X;
 }
 
-// Whether t − T is the time of the step before within rounding: that step's pose is taken then, bit for bit.
+// Whether t − T equals the time of the last step within rounding. If so, the last step's pose is reused, bit for bit.
 inline bool follows(double time_s, double period_s, double last_time_s) noexcept {
   const double rounding_s = 4.0 * std::numeric_limits<double>::epsilon() * (std::abs(time_s) + period_s);
   return std::abs(time_s - period_s - last_time_s) <= rounding_s;

@@ -1,4 +1,4 @@
-// Matrices of up to eight rows, whose size is set at run time. They are stored in place: nothing here allocates.
+// Matrices of up to eight rows whose size is set at run time. They are stored in place and don't allocate.
 #pragma once
 
 #include <Eigen/Core>

@@ -6,7 +6,7 @@
 
 namespace proxarm::models {
 
-// As SelfAdjointEigenSolver::compute() does it, without what it needs for eigenvectors.
+// The algorithm of SelfAdjointEigenSolver::compute(), without its share for eigenvectors.
 SmallVector symmetric_eigenvalues(const SmallMatrix& A) noexcept {
   const double largest = A.cwiseAbs().maxCoeff(), scale = largest > 0.0 ? largest : 1.0;
   const Eigen::Tridiagonalization<SmallMatrix> tridiagonal(A / scale);

@@ -5,7 +5,7 @@
 namespace proxarm::models {
 
 Quaternion rotation_from_z(const Vec3& direction) noexcept {
-  constexpr double nearly = 1e-12;  // below it, 1 + c has lost half of its digits
+  constexpr double nearly = 1e-12;  // closer to a half turn, 1 + c has lost half of its digits
   const Vec3 from = Vec3::UnitZ(), to = direction.normalized();
   const double c = to.dot(from);
   const Vec3 axis = from.cross(to);

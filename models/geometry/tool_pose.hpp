@@ -1,10 +1,10 @@
-// Where a rigid tool is and how it moves: poses, twists, and the step from one to the other on SE(3).
+// The pose of a rigid tool and its changes: poses, twists, and the step from one pose to another on SE(3).
 //
 //   moved(b, ξ) = (x_b + ξ_x, exp(ξ_θ) R_b)
 //   a ⊟ b       = (x_a − x_b, log(R_a R_bᵀ)),  so that moved(b, a ⊟ b) = a
 //
-// Translation and rotation are taken apart: x is the tool's reference point, and a rotation turns the tool about it.
-// All in W; metres and radians.
+// Translation and rotation are separate: x is the tool's reference point, and a rotation turns the tool about it. All
+// in W; metres and radians.
 #pragma once
 
 #include <cmath>
@@ -18,10 +18,10 @@ using Quaternion = Eigen::Quaterniond;
 using Twist = Vec<6>;  // translation (m), then rotation (rad); a wrench has force (N), then torque (Nm)
 
 struct ToolPose {
-  Vec3 position = Vec3::Zero();                     // of the reference point
-  Quaternion orientation = Quaternion::Identity();  // unit, from the tool's frame to W
+  Vec3 position = Vec3::Zero();                     // the reference point
+  Quaternion orientation = Quaternion::Identity();  // unit, from T to W
 
-  // Where a point of the tool is.
+  // A point of the tool, from T to W.
   [[nodiscard]] Vec3 operator*(const Vec3& point_T) const noexcept { return position + orientation * point_T; }
   [[nodiscard]] bool operator==(const ToolPose& other) const noexcept {
     return position == other.position && orientation.coeffs() == other.orientation.coeffs();
@@ -37,7 +37,7 @@ inline Quaternion rotation_by(const Vec3& theta) noexcept {
   return {std::cos(half), v.x(), v.y(), v.z()};
 }
 
-// Its inverse, the shortest: ‖θ‖ ≤ π. Exact to rounding also next to no rotation and to half a turn.
+// The inverse of rotation_by(), with ‖θ‖ ≤ π. Exact to rounding, also near no rotation and near a half turn.
 inline Vec3 rotation_vector(const Quaternion& rotation) noexcept {
   const double sign = rotation.w() < 0.0 ? -1.0 : 1.0;
   const double s = rotation.vec().norm(), c = sign * rotation.w();
@@ -47,9 +47,8 @@ inline Vec3 rotation_vector(const Quaternion& rotation) noexcept {
   return sign * stretch * rotation.vec();
 }
 
-// The shortest rotation that turns UnitZ into a direction of any length but 0; into −UnitZ, about −UnitX. The same
-// numbers as Eigen's Quaternion::FromTwoVectors(UnitZ, direction), which has a singular value decomposition compiled:
-// ten seconds in every source that names it.
+// The shortest rotation from UnitZ to a direction of any length but 0; for −UnitZ it turns about −UnitX. Equals Eigen's
+// Quaternion::FromTwoVectors(UnitZ, direction), which takes ten seconds to compile in every source that uses it.
 Quaternion rotation_from_z(const Vec3& direction) noexcept;
 
 // a ⊟ b.
@@ -59,7 +58,7 @@ inline Twist difference(const ToolPose& a, const ToolPose& b) noexcept {
   return xi;
 }
 
-// Renormalised, so that errors of rounding don't add up over steps.
+// The orientation is renormalised, so that rounding errors don't add up over steps.
 inline ToolPose moved(const ToolPose& pose, const Twist& xi) noexcept {
   return {pose.position + xi.head<3>(), (rotation_by(xi.tail<3>()) * pose.orientation).normalized()};
 }

@@ -15,23 +15,23 @@ namespace {
 
 using Place = std::optional<Vec3>;
 
-// How the corners of a face are to the plane of another one.
+// The heights of a face's corners over the plane of another face.
 struct Beside {
   int above = 0, below = 0;
-  int on = 0;           // in the plane
-  std::size_t off = 0;  // a corner that isn't
+  int on = 0;           // corners in the plane
+  std::size_t off = 0;  // a corner that isn't in the plane
 
-  double most = 0.0;  // of their heights
+  double most = 0.0;  // largest |height|, m
   [[nodiscard]] bool both_sides() const noexcept { return above > 0 && below > 0; }
   [[nodiscard]] bool edge_in_plane() const noexcept { return on == 2; }
-  // It meets the plane in a point at most.
+  // The face meets the plane in at most one point.
   [[nodiscard]] bool clear() const noexcept { return most > kSheet_m && on < 2 && !both_sides(); }
 };
 
-// The directions from a line to the faces on both sides of an edge that lies in it.
+// Directions from a line to the two faces beside an edge that lies in the line.
 using Wedge = std::array<Vec3, 2>;
 
-// Whether two wedges about one line go through each other: the one's faces are on both sides of the other one's.
+// Whether two wedges about one line cross: the faces of one are on both sides of the other.
 bool cross_about(const Vec3& line, const Wedge& a, const Wedge& b) noexcept {
   const Vec3 u = a[0].normalized(), v = line.cross(u);
   const auto angle = [&](const Vec3& x) {
@@ -46,7 +46,7 @@ Vec3 across(const Vec3& from, const Vec3& line, const Vec3& to) noexcept {
   return (to - from) - line.dot(to - from) * line;
 }
 
-// Of two faces of a mesh: do they cross or lie on one another, and where?
+// Do two faces of a mesh cross or lie on one another, and where?
 class FacePairs {
  public:
   explicit FacePairs(const TriangleMesh& mesh)
@@ -96,12 +96,12 @@ class FacePairs {
     return found;
   }
 
-  // Of faces that share an edge.
+  // For faces that share an edge.
   [[nodiscard]] bool folded(std::uint32_t f, std::uint32_t g) const noexcept {
     return std::min(beside(f, g).most, beside(g, f).most) <= sheet_ && overlap(f, g);
   }
 
-  // By how much the shadows of two faces overlap in a direction.
+  // By how much the projections of two faces onto a direction overlap, m.
   [[nodiscard]] double overlap_along(const Vec3& unit, std::uint32_t f, std::uint32_t g) const noexcept {
     const Vec3& origin = mesh_.corner(f, 0);
     const auto shadow = [&](std::uint32_t face) {
@@ -114,8 +114,8 @@ class FacePairs {
     return std::min(high_f - low_g, high_g - low_f);
   }
 
-  // In the plane of f, by the separating-axis theorem: convex polygons lie apart if and only if one of their sides
-  // separates them.
+  // Tests overlap in the plane of f by the separating-axis theorem: convex polygons are apart if and only if one of
+  // their sides separates them.
   [[nodiscard]] bool overlap(std::uint32_t f, std::uint32_t g) const noexcept {
     const Vec3& n = mesh_.face(f).normal;
     for (const std::uint32_t of : {f, g}) {
@@ -127,9 +127,9 @@ class FacePairs {
     return true;
   }
 
-  // Where one goes through the other: exactly, and deeper than rounding. The latter is how far one has to be moved for
-  // them to be apart, least of all directions: the normals, and those across an edge of either. (Any direction proves
-  // that they are, so it does no harm that the one across nearly parallel edges is rounded.)
+  // The place where one face goes through the other: decided exactly, and only if deeper than rounding. The depth is
+  // the shortest move that separates the two, along a normal or across an edge of each. (Rounding of the direction
+  // across nearly parallel edges does no harm: any direction can prove them apart.)
   [[nodiscard]] Place cut(std::uint32_t f, std::uint32_t g) const noexcept {
     Place at = cut_by_edge(f, g);
     if (!at) at = cut_by_edge(g, f);
@@ -153,8 +153,8 @@ class FacePairs {
     return {};
   }
 
-  // The edge of g across from the corner `off` lies in f's plane: does g's surface go on behind it, on the other side
-  // of f, or of the two faces beside f's own edge that it lies on?
+  // The edge of g opposite the corner `off` lies in f's plane. Does g's surface continue behind it, on the other side
+  // of f, or of the two faces beside the edge of f on which it lies?
   [[nodiscard]] Place passed(std::uint32_t f, std::uint32_t g, std::size_t off) const noexcept {
     const std::size_t k = (off + 1) % 3;
     const Vec3 &from = mesh_.corner(g, k), &to = mesh_.corner(g, (k + 1) % 3);
@@ -180,15 +180,15 @@ class FacePairs {
     return {};
   }
 
-  // A piece of a line, by the distance from its first point.
+  // A piece of a line, by the distance from its first point, m.
   struct Piece {
     double low, high;
   };
-  // Into the face, across its side k.
+  // The unit direction into the face, across its side k.
   [[nodiscard]] Vec3 inwards(std::uint32_t f, std::size_t k) const noexcept {
     return mesh_.face(f).normal.cross(side(f, k)).normalized();
   }
-  // That is inside of a face in whose plane the line lies, and on none of its sides.
+  // The piece of a line in the face's plane that is inside the face and on none of its sides.
   [[nodiscard]] Piece inside(std::uint32_t f, const Vec3& from, const Vec3& line, double length) const noexcept {
     Piece piece{0.0, length};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -200,7 +200,7 @@ class FacePairs {
     }
     return piece;
   }
-  // That is on the face's side k.
+  // The piece of a line that is on the face's side k.
   [[nodiscard]] Piece on_side(std::uint32_t f, std::size_t k, const Vec3& from, const Vec3& line,
                               double length) const noexcept {
     const Vec3 in = inwards(f, k), start = mesh_.corner(f, k) - from, end = start + side(f, k);
@@ -209,7 +209,7 @@ class FacePairs {
             std::min(length, std::max(line.dot(start), line.dot(end)))};
   }
 
-  // The corner of the one other face at a face's edge k that isn't on the edge.
+  // The opposite corner of the face on the other side of edge k; nullopt unless exactly one other face has this edge.
   [[nodiscard]] std::optional<Vec3> apex_beyond(std::uint32_t f, std::size_t k) const noexcept {
     const std::uint32_t a = mesh_.triangle(f)[k], b = mesh_.triangle(f)[(k + 1) % 3];
     std::optional<Vec3> apex;

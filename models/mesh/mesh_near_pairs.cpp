@@ -15,13 +15,13 @@ namespace {
 using Visit = std::function<bool(std::uint32_t, std::uint32_t)>;
 using Faces = std::vector<std::uint32_t>;
 
-// The tree's nodes by the pair and the place in it.
+// A node of the tree: its pair, and its index in the pair.
 struct Node {
   std::uint32_t pair, of;
   [[nodiscard]] bool operator==(const Node&) const = default;
 };
 
-// A face's box, in float, so wide that faces whose boxes don't meet are further apart than `margin`.
+// A face's box, in float, so wide that faces whose boxes don't meet are farther apart than `margin`.
 struct Box {
   std::array<float, 3> low, high;
 };
@@ -45,7 +45,8 @@ bool meet(const Box& a, const Box& b) noexcept {
          a.low[2] <= b.high[2] && b.low[2] <= a.high[2];
 }
 
-// Calls visit(f, g) for each two faces whose boxes meet; false if more of them did than `most`, or visit() said stop.
+// Calls visit(f, g) for each two faces whose boxes meet. False if there were more than `most`, or if visit() returned
+// false.
 template <typename Meeting>
 bool walk_tree(const TriangleMesh& mesh, const std::vector<Box>& boxes, double margin, std::size_t most,
                Meeting visit) {
@@ -74,7 +75,8 @@ bool walk_tree(const TriangleMesh& mesh, const std::vector<Box>& boxes, double m
       }
       continue;
     }
-    // Of an inner node, those within it. A node beside itself is both of them, and one beside the other.
+    // An inner node is replaced by its two children. A node paired with itself gives both of them with themselves, and
+    // one with the other.
     const std::uint32_t of_a = count(a) > 0 ? 1 : 2, of_b = count(b) > 0 ? 1 : 2;
     for (std::uint32_t i = 0; i < of_a; ++i) {
       for (std::uint32_t j = same ? i : 0; j < of_b; ++j) {
@@ -90,19 +92,19 @@ struct Cell {
   Vec3 low, high;
 };
 
-// Divides space into cells, and those again, as long as that makes the pairs of faces that share a cell fewer.
+// Divides space into cells, recursively, as long as that reduces the number of pairs of faces that share a cell.
 //
-// Pairs of faces around one vertex v, its fan, share a cell there however small it is. They needn't be looked at in it,
-// nor anywhere else where neither comes with its rim, the edge across from v:
-//   Two triangles that share the corner v, and a point other than corners of both, share a piece of a ray from v (they
-//   are convex), and the ray leaves the smaller of them, there, through its rim. So they meet in a point of a rim.
-//   Two that share the corners v and w, and overlap in a plane, meet in a point that is of a rim as seen from v, and of
-//   one as seen from w: where the ray from v along the one's side leaves the other, or in the corner of one that lies
-//   within the other. So it doesn't matter of which of the two the fan is taken to be.
-//   Two that share three corners are the same face twice, and are found by their corners.
-// The same holds for faces that lie within near_m of one another's plane, in the projection onto it. A cell is taken to
-// be larger by 2 near_m on all sides: once for that distance, and once for rounding, which is a few u times the largest
-// coordinate S, where lift_m() is 64 u S.
+// Faces around one vertex v, its fan, share a cell there at any size of the cell. The rim of such a face is its edge
+// opposite v. Two faces of the fan need no test in a cell that neither one's rim enters:
+//   Two triangles that share the corner v, and a point other than corners of both, share a piece of a ray from v
+//   (they are convex). The ray leaves the smaller one through its rim. So they meet at a point of a rim.
+//   Two that share the corners v and w, and overlap in a plane, meet at a point that is on a rim as seen from v and on
+//   one as seen from w: where the ray from v along a side of one leaves the other, or at a corner of one within the
+//   other. So either vertex may be taken as the fan's.
+//   Two that share three corners are the same face twice; twins() finds them.
+// The same holds for faces that lie within near_m of one another's plane, in the projection onto it. A cell is extended
+// by 2 near_m on all sides: once for that distance, and once for rounding, which is a few u times the largest
+// coordinate S, while lift_m() is 64 u S.
 class CellSearch {
  public:
   CellSearch(const TriangleMesh& mesh, const std::vector<Box>& boxes, double near_m, const Visit& visit)
@@ -119,17 +121,17 @@ class CellSearch {
  private:
   static constexpr double kLess = 0.8, kCredit = 4.0;
 
-  // From where to where a face's piece within a cell is along an axis.
+  // The interval that a face's piece within a cell covers along an axis.
   struct Shadow {
     double low, high;
     std::uint32_t face;
   };
-  using Shadows = std::vector<Shadow>;  // by their lows
+  using Shadows = std::vector<Shadow>;  // sorted by their lows
 
-  // What comes into a cell, and how many pairs are to be looked at there.
+  // The faces that enter a cell, and the number of pairs to test there.
   struct Part {
     Cell cell;
-    Shadows fan, others;  // fan: without their rims
+    Shadows fan, others;  // fan: faces whose rim stays out of the cell
     std::size_t pairs = 0;
     [[nodiscard]] std::size_t size() const noexcept { return fan.size() + others.size(); }
   };
@@ -138,7 +140,7 @@ class CellSearch {
     return !meet(boxes_[f], boxes_[g]) || visit_(std::min(f, g), std::max(f, g));
   }
 
-  // Faces of the same three corners.
+  // Visits pairs of faces with the same three corners.
   [[nodiscard]] bool twins(const Faces& faces) const {
     std::vector<std::pair<std::array<std::uint32_t, 3>, std::uint32_t>> corners;
     for (const std::uint32_t f : faces) {
@@ -155,9 +157,9 @@ class CellSearch {
     return true;
   }
 
-  // False: stop. A cell is divided if that leaves less than kLess of its pairs, or else at the cost of `credit`. So
-  // after n divisions there are at most kCredit kLessⁿ times the pairs of the whole: it ends, and what is divided in
-  // vain is looked at for no more than kCredit times the pairs.
+  // Returns false to stop. Divides a cell if that leaves less than kLess of its pairs, or else at the expense of
+  // `credit`. So n divisions leave at most kCredit kLessⁿ times the pairs of the whole: the recursion ends, and useless
+  // divisions cost at most kCredit times the pairs.
   bool search(const Part& part, double credit) const {  // NOLINT(misc-no-recursion): it ends, as above
     constexpr std::size_t few = 8;                      // pairs for each face: not worth dividing
     if (part.pairs <= few * part.size()) return look_at(part);
@@ -169,7 +171,7 @@ class CellSearch {
     return std::all_of(parts.begin(), parts.end(), [&](const Part& child) { return search(child, left); });
   }
 
-  // Pairs whose shadows meet: the one with the higher low begins within the other one's.
+  // Tests pairs whose intervals overlap: the one with the higher low begins within the other.
   [[nodiscard]] bool look_at(const Part& part) const {
     const auto look = [this](const Shadow& of, auto first, auto last) {
       return std::all_of(first, last, [&](const Shadow& other) { return meeting(of.face, other.face); });
@@ -200,7 +202,7 @@ class CellSearch {
     return std::upper_bound(shadows.begin(), shadows.end(), high, [](double x, const Shadow& a) { return x < a.low; });
   }
 
-  // Into eight, not quite in halves: meshes have many corners in the middle.
+  // Divides into eight, not quite in halves: meshes have many corners in the middle.
   [[nodiscard]] std::vector<Part> divided(const Part& part) const {
     const Vec3 share(0.4615, 0.5291, 0.4837);
     const Vec3 middle = part.cell.low + share.cwiseProduct(part.cell.high - part.cell.low);
@@ -237,7 +239,7 @@ class CellSearch {
     return part;
   }
 
-  // The vertex of most of them.
+  // The vertex that most of the faces have.
   [[nodiscard]] std::uint32_t busiest(const Faces& faces) const {
     Faces corners;
     corners.reserve(3 * faces.size());
@@ -254,8 +256,8 @@ class CellSearch {
     return found;
   }
 
-  // By the separating-axis theorem: a box and a triangle, or an edge, lie apart if and only if they do along an axis of
-  // the box, the triangle's normal, or an axis across an edge of each.
+  // By the separating-axis theorem: a box and a triangle (or an edge) are apart if and only if they are apart along an
+  // axis of the box, the triangle's normal, or an axis across an edge of each.
   [[nodiscard]] bool comes_into(std::uint32_t f, const Cell& cell) const noexcept {
     const Vec3 middle = 0.5 * (cell.low + cell.high), half = 0.5 * (cell.high - cell.low) + Vec3::Constant(margin_);
     const std::array<Vec3, 3> at{mesh_.corner(f, 0) - middle, mesh_.corner(f, 1) - middle, mesh_.corner(f, 2) - middle};
@@ -296,8 +298,9 @@ class CellSearch {
     return false;
   }
 
-  // Along the axis where they are thinnest, of those of space, and the normals of some faces and the axes across the
-  // longest edge in them: what lies on or beside one another, as in a stack or a fan, is apart along one of these.
+  // The intervals along the axis on which they are thinnest. Candidates are the coordinate axes, the normals of some
+  // faces, and the axes in those faces across their longest edge: in a stack or a fan, faces are apart along one of
+  // these.
   [[nodiscard]] Shadows thinnest_shadows(const Cell& cell, const Faces& faces) const {
     const std::vector<Piece> pieces = pieces_of(cell, faces);
     Shadows thinnest = shadows_of(pieces, Vec3::UnitX());
@@ -322,7 +325,8 @@ class CellSearch {
     return thinnest;
   }
 
-  // What is in a cell of a triangle has nine corners at most: each of its six sides cuts off one and makes two.
+  // The part of a triangle within a cell. It has at most nine corners: each of the cell's six sides cuts off one and
+  // makes two.
   struct Piece {
     std::uint32_t face;
     std::size_t count;
@@ -342,20 +346,21 @@ class CellSearch {
     }
     return pieces;
   }
-  // Leaves what has sign · x[axis] ≤ most (Sutherland and Hodgman, 1974), or the piece as it is if nothing has.
+  // Keeps the part with sign · x[axis] ≤ most (Sutherland and Hodgman, 1974), or the whole piece if there is no such
+  // part.
   static void cut(Piece& piece, Eigen::Index axis, double sign, double most) noexcept {
     Piece left{piece.face, 0, {}};
     for (std::size_t k = 0; k < piece.count; ++k) {
       const Vec3 &a = piece.corners[k], &b = piece.corners[(k + 1) % piece.count];
       const double over_a = sign * a[axis] - most, over_b = sign * b[axis] - most;
-      if (left.count + 2 > left.corners.size()) return;  // by rounding, of a polygon that isn't convex any more
+      if (left.count + 2 > left.corners.size()) return;  // possible by rounding, if the polygon isn't convex any more
       if (over_a <= 0.0) left.corners[left.count++] = a;
       if ((over_a <= 0.0) != (over_b <= 0.0)) left.corners[left.count++] = a + over_a / (over_a - over_b) * (b - a);
     }
     if (left.count > 0) piece = left;
   }
 
-  // Wider by half of margin_ on both sides, with the rounding of the products in it, as above.
+  // Widens the intervals by half of margin_ on both sides, which includes the rounding of the products, as above.
   [[nodiscard]] Shadows shadows_of(const std::vector<Piece>& pieces, const Vec3& axis) const {
     Shadows shadows;
     shadows.reserve(pieces.size());
@@ -370,7 +375,7 @@ class CellSearch {
     }
     return shadows;
   }
-  // How many of them a point is in the shadow of, in the mean.
+  // The mean number of intervals that cover a point.
   [[nodiscard]] static double crowding(const Shadows& shadows) noexcept {
     double low = shadows[0].low, high = shadows[0].high, sum = 0.0;
     for (const Shadow& shadow : shadows) {
@@ -390,7 +395,7 @@ class CellSearch {
 }  // namespace
 
 void each_near_pair(const TriangleMesh& mesh, double near_m, const Visit& visit) {
-  // Boxes of most meshes meet those of ten to twenty others.
+  // In most meshes a box meets ten to twenty others.
   constexpr std::size_t many = 64;
   const std::vector<Box> boxes = boxes_of(mesh, near_m);
   bool stopped = false;

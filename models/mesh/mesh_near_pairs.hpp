@@ -1,4 +1,4 @@
-// Which faces of a mesh are so near one another that they may cross: few of all pairs, in a mesh of any kind.
+// Finds the pairs of faces of a mesh that are near enough to cross: few of all pairs, in any kind of mesh.
 #pragma once
 
 #include <functional>
@@ -7,15 +7,15 @@
 
 namespace proxarm::models {
 
-// Calls visit(f, g), f < g, for pairs of faces of a known normal (Face::trust). Among them are all that
-//   have points within `near_m` of each other, other than corners that they share (what touches in those alone needn't
-//   be among them), and all that have the same three corners.
-// A pair may be visited more than once. Stops when visit() returns false. Precondition: near_m ≥ mesh.lift_m().
+// Calls visit(f, g), f < g, for pairs of faces of known normal (Face::trust). They include
+//   all pairs that have points within `near_m` of each other, except at corners that they share, and
+//   all pairs with the same three corners.
+// It may visit a pair more than once. Stops if visit() returns false. Precondition: near_m ≥ mesh.lift_m().
 //
-// At first by two walks down the mesh's tree, in which boxes keep faces apart: enough for most meshes. Around a vertex
-// of many faces, and in a stack that leans, all boxes meet. Where many do, space is divided into cells instead, until
-// few faces come into each; see CellSearch. That takes n log n for fans, cones and parallel sheets of n faces. It is
-// quadratic still for n large faces of different directions that boxes don't keep apart, such as shells in one another.
+// For most meshes the boxes of the mesh's tree keep faces apart. But around a vertex of many faces, and in a tilted
+// stack, all boxes meet. If too many do, space is divided into cells until each has few faces; see CellSearch. That
+// takes n log n for fans, cones and parallel sheets of n faces. It remains quadratic for n large faces of different
+// directions that boxes don't separate, such as nested shells.
 void each_near_pair(const TriangleMesh& mesh, double near_m,
                     const std::function<bool(std::uint32_t, std::uint32_t)>& visit);
 

@@ -1,8 +1,8 @@
-// A triangle mesh among other obstacles. Each proxy needs a MeshObstacle of its own, since it remembers where the proxy
+// A triangle mesh as an obstacle of a World. Each proxy needs a separate MeshObstacle, which remembers where the proxy
 // was; the TriangleMesh may be shared.
 //
-// Where several faces of the mesh hold the proxy, the World sees the one that presses most. If a solution with other
-// objects would lead through a further face, that face joins them (World::fits).
+// If several faces hold the proxy, the World sees the one that presses most. If a solution with other objects would
+// lead through a further face, that face joins them (World::fits).
 #pragma once
 
 #include <limits>
@@ -21,7 +21,7 @@ class MeshObstacle final : public Obstacle {
   MeshObstacle(std::shared_ptr<const TriangleMesh> mesh, double friction, std::vector<double> of_face = {})
       : surface_(std::move(mesh), friction, std::move(of_face)) {}
 
-  // Step::feature is the face's index, or the index's complement (~) if the face's back is touched.
+  // Step::feature is the face's index, or its complement (~) if the face's back is touched.
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
     Step out;
     const std::uint64_t unresolved = surface_.unresolved_steps();
@@ -52,8 +52,8 @@ class MeshObstacle final : public Obstacle {
     return count;
   }
 
-  // A proxy may end at r if a step from q to p = r ends there. It may also end within a few lifts of where that step
-  // ends, since the tangent planes of two faces differ by so much where they meet; but never, exactly, behind a face.
+  // A proxy may end at r if a step from q to p = r ends there. It may also end within a few lifts of that step's end,
+  // because the tangent planes of adjacent faces differ by that much; but never behind a face, which is tested exactly.
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     const Vec3 reached = surface_(1.0, r, q);
     if (reached == r) return false;
@@ -83,8 +83,8 @@ class MeshObstacle final : public Obstacle {
     return surface_.parts(x, y, normal);
   }
   // Let the pose have a translation t, ‖t‖₁ ≤ `size`, and S be as in TriangleMesh::lift_m. A touched point has ‖x‖₁ ≤
-  // √3 S + size in W. On the way to W and back it is rounded by 8 u (‖x‖₁ + ‖t‖₁), and by 10 u √3 S because a rotation
-  // is orthonormal only within rounding. World does this twice: together less than 64 u (S + size). As much again keeps
+  // √3 S + size in W. The way to W and back rounds it by 8 u (‖x‖₁ + ‖t‖₁), and by 10 u √3 S because a rotation is
+  // orthonormal only within rounding. World does this twice: together less than 64 u (S + size). The same again keeps
   // computed heights off the faces.
   void set_rounding_size(double size_m) noexcept override {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
@@ -101,7 +101,7 @@ class MeshObstacle final : public Obstacle {
     return front ? contact.feature : ~contact.feature;
   }
 
-  mutable MeshSurface surface_;  // what it remembers makes it faster and doesn't change its answers
+  mutable MeshSurface surface_;  // remembers data for speed; its answers don't depend on them
   mutable std::uint32_t near_ = 0;
 };
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 
-// The rounded result of a sum or product and its rounding error: high + low is exact.
+// A rounded sum or product and its rounding error: high + low is exact.
 struct Pair {
   double high, low;
 };
@@ -20,7 +20,7 @@ Pair exact_sum(double a, double b) noexcept {
 }
 
 Pair exact_product(double a, double b) noexcept {
-  // Dekker's: halves of 26 bits, whose products are exact. (A fused multiply-add isn't there on every machine.)
+  // Dekker's method: halves of 26 bits, whose products are exact. (Not every machine has a fused multiply-add.)
   constexpr double split = 134217729.0;  // 2²⁷ + 1
   const double x = a * b;
   const double a_big = split * a, a_high = a_big - (a_big - a), a_low = a - a_high;
@@ -29,7 +29,7 @@ Pair exact_product(double a, double b) noexcept {
 }
 
 // An exact sum as Shewchuk's expansion: doubles that don't overlap, smallest first, without zeros. The last one has the
-// sign of the sum.
+// sum's sign.
 template <std::size_t Most>
 class ExactSum {
  public:
@@ -63,7 +63,7 @@ class ExactSum {
   std::size_t count_ = 0;
 };
 
-// b − a as two doubles, exactly.
+// b − a as pairs of doubles, exact.
 struct ExactVector {
   std::array<Pair, 3> of;
   ExactVector(const Vec3& a, const Vec3& b) noexcept
@@ -100,9 +100,9 @@ int exact_orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& x
   return sum.sign();
 }
 
-// The segment and the triangle lie in one plane. Both are convex, so they don't touch if and only if the line of one of
-// the triangle's sides, or that of the segment, separates them. Which side of a line a point is on is told by the
-// orientation with a third point beside the plane.
+// The segment and the triangle lie in one plane. Both are convex, so they are apart if and only if the line of a
+// triangle's side, or of the segment, separates them. The orientation with a third point beside the plane gives the
+// side of a line.
 bool touches_in_plane(const Vec3& x, const Vec3& y, const std::array<Vec3, 3>& t) noexcept {
   Eigen::Index axis = 0;
   (t[1] - t[0]).cross(t[2] - t[0]).cwiseAbs().maxCoeff(&axis);
@@ -142,7 +142,7 @@ bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
     const Eigen::Index j = (i + 1) % 3;
     const double m = d[i] * e[j], n = d[j] * e[i];
     if (std::abs(m - n) > 8.0 * u * (std::abs(m) + std::abs(n)))
-      return false;  // each product difference is wrong by 4 u at most
+      return false;  // each difference of products is wrong by at most 4 u
   }
   const ExactVector v(a, b), w(a, c);
   return minor_of(v, w, 0, 1).sign() == 0 && minor_of(v, w, 1, 2).sign() == 0 && minor_of(v, w, 2, 0).sign() == 0;

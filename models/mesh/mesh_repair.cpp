@@ -18,7 +18,7 @@ std::uint64_t edge_key(std::uint32_t a, std::uint32_t b) noexcept {
   return a < b ? (std::uint64_t{a} << 32 | b) : (std::uint64_t{b} << 32 | a);
 }
 
-// The ends of edges that have one face, in order.
+// The ends of all edges with one face, sorted.
 std::vector<std::uint32_t> border_corners(const TriangleSoup& soup) {
   std::vector<std::uint64_t> edges;
   edges.reserve(3 * soup.triangles.size());
@@ -43,7 +43,7 @@ struct NearPair {
   std::uint32_t a, b;  // a < b
 };
 
-// Pairs of corners within a distance, the nearest first. A sweep over cells of a grid as wide as that.
+// Finds pairs of corners within a distance, nearest first, with a grid of cells as wide as that distance.
 class NearCorners {
  public:
   NearCorners(const TriangleSoup& soup, const std::vector<std::uint32_t>& corners, double within)
@@ -52,8 +52,8 @@ class NearCorners {
     std::sort(cells_.begin(), cells_.end());
   }
 
-  // Of a cell, a corner looks at kMost others with a larger index: enough for all to become one by way of each other,
-  // and no more than linear in time where a tolerance holds thousands of corners.
+  // In each cell, a corner looks at kMost others with a larger index: enough to join all of them through each other,
+  // and linear in time if thousands of corners lie within the tolerance.
   [[nodiscard]] std::vector<NearPair> pairs() const {
     std::vector<NearPair> found;
     for (const auto& [cell, corner] : cells_) {
@@ -76,7 +76,7 @@ class NearCorners {
   static constexpr int kMost = 64;
   using Cell = std::array<std::int64_t, 3>;
   [[nodiscard]] Cell cell_of(const Vec3& x) const {
-    // Coordinates are up to 1e9 m (TriangleMesh), so cells of 1e-9 m and more have numbers up to 1e18: no overflow.
+    // Coordinates are up to 1e9 m (TriangleMesh), so cells of at least 1e-9 m have numbers up to 1e18: no overflow.
     const double size = std::max(within_, 1e-9);
     return {static_cast<std::int64_t>(std::floor(x.x() / size)), static_cast<std::int64_t>(std::floor(x.y() / size)),
             static_cast<std::int64_t>(std::floor(x.z() / size))};
@@ -87,7 +87,7 @@ class NearCorners {
   std::vector<std::pair<Cell, std::uint32_t>> cells_;
 };
 
-// Which corners have become one: union-find, with each set's box and its triangles.
+// Sets of corners that have become one: union-find, with each set's box and triangles.
 class Sets {
  public:
   Sets(const TriangleSoup& soup, double within)
@@ -121,7 +121,7 @@ class Sets {
   }
 
  private:
-  // Apart from triangles smaller than the tolerance.
+  // Ignores triangles smaller than the tolerance.
   [[nodiscard]] bool share_a_triangle(std::uint32_t a, std::uint32_t b) {
     if (triangles_[b].size() < triangles_[a].size()) std::swap(a, b);
     return std::any_of(triangles_[a].begin(), triangles_[a].end(), [&](std::uint32_t t) {
@@ -141,7 +141,7 @@ class Sets {
   double within_;
   std::vector<std::uint32_t> parent_;
   std::vector<Bounds> boxes_;
-  std::vector<std::vector<std::uint32_t>> triangles_;  // of each root
+  std::vector<std::vector<std::uint32_t>> triangles_;  // of each root's set
 };
 
 }  // namespace
@@ -170,7 +170,7 @@ WeldedCorners weld_borders(TriangleSoup& soup, double within_m) {
 
 namespace {
 
-// Turns faces whose front is free to choose so that they agree with their neighbours.
+// Turns faces whose front may be chosen so that they agree with their neighbours.
 class Fronts {
  public:
   Fronts(TriangleSoup& soup, const std::vector<bool>& free) : soup_(soup), free_(free), done_(free.size(), false) {
@@ -183,7 +183,7 @@ class Fronts {
   }
 
   void choose() {
-    // From faces that have one front on; then parts in which each has two.
+    // First starts from faces with a fixed front, then treats the parts without any.
     for (std::uint32_t f = 0; f < done_.size(); ++f) {
       if (!free_[f] && !done_[f]) (void)spread(f);
     }
@@ -208,7 +208,7 @@ class Fronts {
     return (t[0] == a && t[1] == b) || (t[1] == a && t[2] == b) || (t[2] == a && t[0] == b);
   }
 
-  // Over edges of two faces, to faces that are free.
+  // Walks from a face over edges with two faces, and turns the faces whose front may be chosen.
   std::vector<std::uint32_t> spread(std::uint32_t from) {
     std::vector<std::uint32_t> part{from};
     done_[from] = true;
@@ -235,7 +235,7 @@ class Fronts {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> edges_;
 };
 
-// The three corners in order, and whether that turned the front.
+// The three corners sorted, and whether sorting turned the front.
 std::pair<Corners, bool> in_order(Corners t) noexcept {
   bool turned = false;
   const auto order = [&](std::size_t i, std::size_t j) {
@@ -249,14 +249,15 @@ std::pair<Corners, bool> in_order(Corners t) noexcept {
   return {t, turned};
 }
 
-// Faces of the same three corners: the first one, and the first with the opposite front if there is one.
+// The first face with these three corners, and the first one with the opposite front, if any.
 struct SameCorners {
   std::uint32_t face;
   std::optional<std::uint32_t> opposite;
 };
 
-// Which of those with both fronts are surfaces on their own: connected ones of which no edge has a face with one front.
-// A wall between two bodies that touch isn't one: each of them needs its side of it.
+// For each set of corners: whether its faces with both fronts belong to a separate surface, a connected one without an
+// edge that a face with only one front shares. A wall between two bodies that touch isn't one: each body needs its side
+// of the wall.
 std::vector<bool> surfaces_on_their_own(const TriangleSoup& soup, const std::vector<SameCorners>& all) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> edges;
   for (std::uint32_t s = 0; s < all.size(); ++s) {
@@ -289,7 +290,7 @@ std::vector<bool> surfaces_on_their_own(const TriangleSoup& soup, const std::vec
 }  // namespace
 
 RepeatedFaces leave_out_repeated(TriangleSoup& soup) {
-  std::vector<std::tuple<Corners, std::uint32_t, bool>> faces;  // and whether its front is turned
+  std::vector<std::tuple<Corners, std::uint32_t, bool>> faces;  // corners, face, whether sorting turned its front
   faces.reserve(soup.triangles.size());
   for (std::uint32_t f = 0; f < soup.triangles.size(); ++f) {
     const auto [corners, turned] = in_order(soup.triangles[f]);

@@ -1,24 +1,23 @@
 // 𝒢 of a triangle mesh with friction, for a proxy that is a point.
 //
-// The proxy goes from q along straight pieces that touch no triangle. Each piece is tested exactly
-// (mesh_predicates.hpp) against all faces that could be near, so the proxy can't pass the surface, however irregular
-// the mesh is. The pieces lead:
-//   1. towards p. If nothing is in the way, the step ends there.
-//   2. Otherwise, from where the way is blocked, towards the point at which the faces that the proxy touches hold it:
-//        one face     (4), with q projected onto the face's plane even if q lies over another face: v in (17) is that
-//                     of the whole step, (q(k) − q(k−1))/T
-//        two faces    solve_groove, in a groove as on a convex edge
+// The proxy moves from q along straight pieces that touch no triangle. Each piece is tested exactly
+// (mesh_predicates.hpp) against all near faces, so the proxy can't pass the surface, however irregular the mesh is. The
+// pieces lead:
+//   1. towards p. If this way is free, the step ends at p.
+//   2. otherwise, from the place where the way is blocked, towards the point at which the touched faces hold the proxy:
+//        one face     (4), with q projected onto the face's plane even if q is over another face: v in (17) is the
+//                     whole step's, (q(k) − q(k−1))/T
+//        two faces    solve_groove, in a groove and on a convex edge
 //        three faces  solve_corner
-//      The first set that is complete counts (contact_search.hpp): nothing pulls and nothing else is in the way; fewer
-//      faces come first, then the point nearest to p.
-//   3. Where a piece leads over an edge of its face, the walk goes on from there with the faces around. Where it meets
-//      another face, that face joins the touched ones.
+//      The first complete set counts (contact_search.hpp). Fewer faces come first, then the point nearest to p.
+//   3. over an edge of the face: the walk continues with the faces around. If a piece meets another face, that face
+//      joins the touched ones.
 // If no set of faces is complete, the proxy is held where it is (a vertex can do that).
 //
-// The surface on which the proxy glides is a little in front of the triangles: by the lift (TriangleMesh::lift_m),
-// 2e-14 m for a mesh within one metre, which is some units in the last place. Whether a face is touched is told by
-// exact sides and by heights within a few lifts. A proxy that is on this surface and sticks is returned bit for bit. K
-// does not appear. What is remembered from earlier steps makes a step faster; it doesn't change the result.
+// The surface on which the proxy glides is in front of the triangles by the lift (TriangleMesh::lift_m): 2e-14 m for a
+// mesh within one metre. Exact sides and heights within a few lifts decide whether a face is touched. A proxy that is
+// on this surface and sticks is returned bit for bit. K does not appear. Data kept from earlier steps makes a step
+// faster and doesn't change its result.
 //
 // Both sides of a face hold: a body is solid for a proxy outside, and a cavity for a proxy inside.
 #pragma once
@@ -35,36 +34,35 @@ namespace proxarm::models {
 
 class MeshSurface final : public GeometricAlgorithm<3> {
  public:
-  // Several surfaces may share a mesh. `of_face` is the friction of each face; empty if it is the same everywhere.
-  // Throws std::invalid_argument for a friction that isn't finite and ≥ 0, and for another number of them than of
-  // faces.
+  // Several surfaces may share a mesh. `of_face` is the friction of each face; empty: `friction` everywhere. Throws
+  // std::invalid_argument for a friction that isn't finite and ≥ 0, and if `of_face` has another size than the mesh.
   MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double friction, std::vector<double> of_face = {});
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
   [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
-  // Contact::feature is the face's index in the mesh; its normal is on the proxy's side.
+  // Contact::feature is the face's index in the mesh; the normal points to the proxy's side.
   [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
 
-  // Steps so far in which no set of faces was complete: the proxy stayed where it had got to.
+  // Steps so far in which no set of faces was complete, and the proxy stayed at the place it had reached.
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
 
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
   [[nodiscard]] double friction(std::uint32_t face) const noexcept {
     return friction_of_face_.empty() ? mu_ : friction_of_face_[face];
   }
-  // Takes effect from the next step on, unless friction is by face. Precondition: finite and not negative.
+  // Takes effect with the next step, unless friction is by face. Precondition: finite and not negative.
   void set_friction(double friction) noexcept { mu_ = friction; }
 
-  // How far the touched surface is in front of the faces: TriangleMesh::lift_m(), or more where q and p carry more
-  // rounding than the mesh's own coordinates do (a moving mesh). After a change the next step brings a proxy from the
-  // old surface to the new one. Precondition of set_lift(): at least TriangleMesh::lift_m(), and at most twice or half
-  // of the lift before while a proxy is in contact.
+  // How far the touched surface is in front of the faces, m: TriangleMesh::lift_m(), or more if q and p carry more
+  // rounding than the mesh's coordinates (a moving mesh). After a change, the next step takes the proxy to the new
+  // surface. Precondition of set_lift(): at least TriangleMesh::lift_m(); while a proxy is in contact, between half and
+  // twice the last lift.
   [[nodiscard]] double lift_m() const noexcept { return lift_; }
   void set_lift(double lift_m) noexcept;
 
-  // Whether a face has a point in common with the segment, exactly. If so, `normal` becomes that of the first such
-  // face, towards x.
+  // Whether a face has a point in common with the segment, exactly. If so, `normal` becomes the first such face's
+  // normal, towards x.
   bool parts(const Vec3& x, const Vec3& y, Vec3& normal) noexcept;
 
  private:
@@ -86,18 +84,18 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;
 
-  // All faces that come within near_radius_ of near_centre_. They are gathered again when a way leaves that ball. Each
-  // step looks at all of them, so they are stored by columns for vector instructions. Where more than kNear faces are
-  // that near, the tree is asked at each step instead, which is slower.
+  // All faces within near_radius_ of near_centre_, gathered anew when a way leaves that ball. Each step tests all of
+  // them, so they are stored by columns for vector instructions. If more than kNear faces are that near, each step asks
+  // the tree instead, which is slower.
   static constexpr std::size_t kNear = 96, kTogether = 4;
   struct Near {
     using Column = Eigen::Array<double, kNear, 1>;
-    Column x, y, z, offset;  // of normals; zeros where a normal can't be trusted
+    Column x, y, z, offset;  // of normals; zeros if a normal can't be trusted
     std::array<std::uint32_t, kNear> face;
     std::size_t count = 0;
 
     void add(std::uint32_t index, const TriangleMesh::Face& face) noexcept;
-    // Pads the columns to a multiple of kTogether with planes that nothing is close to.
+    // Pads the columns to a multiple of kTogether with planes far away from everything.
     void finish() noexcept;
   };
   // Calls visit(face) for each near face, except those whose plane provably has both points on one side, farther away
@@ -110,12 +108,12 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   double near_radius_ = -1.0;
   Vec3 last_move_ = Vec3::Zero();
 
-  // The face that last held the proxy alone, and from which side.
+  // The face that last held the proxy alone, and its side.
   struct Held {
     std::uint32_t face = 0;
-    int side = 0;  // 0: there is none
+    int side = 0;  // 1: front, −1: back, 0: no face
     FlatSurface<3> surface = FlatSurface<3>::of_unit(Vec3::Zero(), Vec3::UnitZ());
-    std::array<Vec3, 3> out;    // of each side: the outward normal in the face's plane, unit
+    std::array<Vec3, 3> out;    // for each side of the triangle: the outward normal in the face's plane, unit
     std::array<double, 3> rim;  // outᵀ corner
   };
   Held held_;

@@ -17,7 +17,7 @@ namespace {
 struct Edge {
   std::uint32_t low, high;  // vertices
   std::uint32_t face;
-  bool forth;  // from low to high, as the face goes round
+  bool forth;  // the face traverses it from low to high
   [[nodiscard]] std::pair<std::uint32_t, std::uint32_t> key() const noexcept { return {low, high}; }
 };
 
@@ -36,7 +36,8 @@ std::vector<Edge> sorted_edges(const TriangleMesh& mesh) {
   return edges;
 }
 
-// Which faces are of one part, and which of them face the other way: union-find with the parity to a part's root.
+// Which faces belong to one part, and which of them face the other way: union-find with each face's parity to its
+// part's root.
 class Parts {
  public:
   explicit Parts(std::size_t faces) : parent_(faces), turned_(faces, false), one_sided_(faces, false) {
@@ -53,7 +54,7 @@ class Parts {
       turned = turned != turned_[at];
       at = parent_[at];
     }
-    // Path compression: all on the way hang at the root from now on.
+    // Path compression: all faces on the way get the root as parent.
     for (bool left = turned; parent_[face] != face && face != at;) {
       const std::uint32_t next = parent_[face];
       const bool own = turned_[face];
@@ -64,7 +65,7 @@ class Parts {
     }
     return {at, turned};
   }
-  // `turned`: one of them faces the other way.
+  // `turned`: the two face opposite ways.
   void join(std::uint32_t a, std::uint32_t b, bool turned) {
     const Root x = root(a), y = root(b);
     if (x.face == y.face) {
@@ -86,7 +87,7 @@ Vec3 middle(const TriangleMesh& mesh, std::uint32_t f) {
   return (mesh.corner(f, 0) + mesh.corner(f, 1) + mesh.corner(f, 2)) / 3.0;
 }
 
-// Calls visit(first, last) for each edge's run of faces.
+// Calls visit(first, last) for each edge with its run of faces.
 template <typename Visit>
 void each_edge(const std::vector<Edge>& edges, Visit visit) {
   for (auto first = edges.begin(); first != edges.end();) {
@@ -102,18 +103,18 @@ void note(MeshDefect& defect, const Vec3& at_W) {
 }
 
 struct Outlines {
-  std::vector<std::vector<std::uint32_t>> loops;   // the last vertex is followed by the first
+  std::vector<std::vector<std::uint32_t>> loops;   // the first vertex follows the last
   std::vector<std::vector<std::uint32_t>> chains;  // from the first vertex to the last
 };
 
-// Outlines of the edges that have one face. Each is walked against its face's direction, as what closes it would go.
-// Chains are taken first, from vertices where more edges begin than end. Then as many begin as end everywhere, and each
-// walk comes back to where it began (Euler). A chain ends where outlines meet.
+// Outlines of the edges that have one face, walked against the face's direction, like the faces that would close them.
+// Chains come first, from vertices where more edges begin than end. After that, as many edges begin as end at each
+// vertex, and each walk returns to its start (Euler). A chain ends where outlines meet.
 Outlines outlines_of(std::vector<std::pair<std::uint32_t, std::uint32_t>> open, std::size_t vertices) {
   std::sort(open.begin(), open.end());
   std::vector<bool> used(open.size(), false);
   std::vector<std::int32_t> more_begin(vertices, 0), ends(vertices, 0);
-  std::vector<std::size_t> next(vertices, open.size());  // the first edge from a vertex that may be unused
+  std::vector<std::size_t> next(vertices, open.size());  // first edge from each vertex that may be unused
   for (std::size_t k = open.size(); k-- > 0;) {
     const auto [from, to] = open[k];
     next[from] = k;
@@ -157,7 +158,7 @@ Outlines outlines_of(std::vector<std::pair<std::uint32_t, std::uint32_t>> open, 
   return found;
 }
 
-// Longer outlines aren't holes that anybody wants closed; their area is that of Newell's normal, and costs nothing.
+// Longer outlines aren't worth closing. Their area comes from Newell's normal, at almost no cost.
 constexpr std::size_t longest_loop = 2000;
 
 using Cover = std::vector<std::array<std::uint32_t, 3>>;
@@ -173,8 +174,8 @@ double area_of(const TriangleMesh& mesh, const Cover& cover) {
   return area;
 }
 
-// Cuts off the corner with the smallest triangle, again and again. Along a crack those are the slivers across it,
-// which ear clipping, that looks from one side, can't tell from what lies on either side of it.
+// Repeatedly cuts off the corner with the smallest triangle. Along a crack these are the slivers across it. Ear
+// clipping, which works in a projection, can't tell them from the crack's surroundings.
 Cover slivers_first(const TriangleMesh& mesh, std::vector<std::uint32_t> loop) {
   const auto triangle_at = [&loop](std::size_t k) {
     return std::array{loop[(k + loop.size() - 1) % loop.size()], loop[k], loop[(k + 1) % loop.size()]};
@@ -194,8 +195,8 @@ Cover slivers_first(const TriangleMesh& mesh, std::vector<std::uint32_t> loop) {
   return triangles;
 }
 
-// The smaller of two covers: what closes a loop of n vertices with n − 2 triangles has many, and the smallest of all is
-// costly to find.
+// The better of two covers. A loop of n vertices has many covers of n − 2 triangles, and the smallest is costly to
+// find.
 Cover cover(const TriangleMesh& mesh, const std::vector<std::uint32_t>& loop) {
   Cover ears;
   if (loop.size() < 3) return ears;
@@ -234,7 +235,7 @@ MeshBorder border_of(const TriangleMesh& mesh, const std::vector<std::uint32_t>&
   return border;
 }
 
-// Faces that are turned against most of their part, and parts that are closed and inside out.
+// Counts faces that are turned against most of their part, and closed parts that are inside out.
 void judge_sides(const TriangleMesh& mesh, Parts& parts, const std::vector<bool>& open_part, MeshTopology& found) {
   struct Part {
     std::size_t faces = 0, turned = 0;

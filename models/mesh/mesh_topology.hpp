@@ -1,8 +1,7 @@
-// How the faces of a mesh hang together: where it is open, and what is wrong with it.
+// How the faces of a mesh are connected: where the mesh is open, and what its defects are.
 //
-// A proxy needs none of this: nothing passes a face, however faces are connected. But it falls through a hole that
-// nobody knew of. Vertices with the same coordinates are one (TriangleMesh), so what is found are gaps in space, not
-// in a file's numbering.
+// A proxy needs no connections: nothing passes a face. But it falls through a hole that was overlooked. Vertices with
+// the same coordinates are one (TriangleMesh), so gaps are gaps in space, not in a file's numbering.
 #pragma once
 
 #include <cstddef>
@@ -15,47 +14,47 @@
 
 namespace proxarm::models {
 
-// A closed outline of the mesh: a loop of edges that have a face on one side only.
+// A closed outline of the mesh: a loop of edges with a face on one side only.
 struct MeshHole {
-  std::vector<std::uint32_t> loop;  // vertices, in turn
-  Vec3 centre = Vec3::Zero();       // the mean of them, in W
-  // Four times the area that closes it over its length: the diameter of a round hole, the side of a square one, twice
+  std::vector<std::uint32_t> loop;  // vertices, in order
+  Vec3 centre = Vec3::Zero();       // mean of the vertices, in W
+  // Four times the closing area over the loop's length: the diameter of a round hole, the side of a square one, twice
   // the width of a crack.
   double size_m = 0.0;
 };
 
-// Edges with a face on one side only that don't come back to where they begin: they end at an edge of three and more
-// faces, or where fronts change.
+// A chain of edges with a face on one side only that isn't closed: it ends at an edge of three or more faces, or where
+// neighbours have opposite fronts.
 struct MeshBorder {
   std::size_t edges = 0;
   double length_m = 0.0;
-  Vec3 centre = Vec3::Zero();  // the mean of its vertices, in W
+  Vec3 centre = Vec3::Zero();  // mean of the vertices, in W
 };
 
 struct MeshTopology {
-  std::size_t parts = 0;            // faces that share an edge are of one part
-  std::vector<MeshHole> holes;      // the smallest first
-  std::vector<MeshBorder> borders;  // the shortest first
-  MeshDefect non_manifold;          // edges of three and more faces
-  MeshDefect flipped;               // faces seen from behind where most of their part is seen from the front
-  std::size_t one_sided = 0;        // parts of which nobody can say which side is the front, such as a Möbius strip
+  std::size_t parts = 0;            // connected parts: faces that share an edge are in one part
+  std::vector<MeshHole> holes;      // smallest first
+  std::vector<MeshBorder> borders;  // shortest first
+  MeshDefect non_manifold;          // edges of three or more faces
+  MeshDefect flipped;               // faces turned against most of their part
+  std::size_t one_sided = 0;        // parts whose faces can't all agree on a front, such as a Möbius strip
   std::size_t inside_out = 0;       // closed parts whose fronts are inside
 };
 MeshTopology topology_of(const TriangleMesh& mesh);
 
-// What keeps a mesh from being a body, with an inside: "is open, with a hole of 12 mm at …" and the like; and what may
-// be done about it. Empty for one that is. `closing`: how many of its triangles close_holes_m has added, which may be
-// those that lie on others.
+// Why a mesh isn't a body with an inside ("is open, with a hole of 12 mm at …"), and what the user can do about it.
+// Both empty for a body. `closing`: how many triangles close_holes_m has added to it, which may be the ones that lie on
+// others.
 struct NoInside {
   std::string what, advice;
 };
 NoInside why_no_inside(const TriangleMesh& mesh, std::uint64_t closing = 0);
 
-// The mesh with all holes up to that size closed by triangles between their vertices. Where nothing is to be closed the
-// soup is that of the mesh.
+// The mesh with all holes up to that size closed by triangles between their vertices. Without such holes, the mesh's
+// own triangles.
 TriangleSoup with_holes_closed(const TriangleMesh& mesh, double up_to_m);
 
-// "12 mm at x 0.1, y 0.2, z 0.3 m" and the like, for people.
+// A place and a length as text for users: "x 0.1, y 0.2, z 0.3 m" and "12 mm".
 std::string place_text(const Vec3& at_W);
 std::string size_text(double size_m);
 

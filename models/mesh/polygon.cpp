@@ -5,7 +5,7 @@
 namespace proxarm::models {
 namespace {
 
-// In long double a product of two differences of floats is exact, and that of doubles is known to 2⁻⁶³.
+// In long double a product of two differences of floats is exact, and of doubles exact to 2⁻⁶³.
 struct Flat {
   long double x, y;
   bool operator==(const Flat&) const = default;
@@ -15,8 +15,8 @@ long double turn(const Flat& a, const Flat& b, const Flat& c) noexcept {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-// The corners in the plane that shows most of the polygon, counter-clockwise; none where it has no area to show, as a
-// bow whose halves are alike.
+// The corners projected onto the coordinate plane that shows most of the polygon, counter-clockwise. Empty if the
+// polygon has no net area, such as a bow with equal halves.
 std::vector<Flat> flattened(std::span<const Vec3> vertices, std::span<const std::uint32_t> corners) {
   Vec3 normal = Vec3::Zero();
   const Vec3& origin = vertices[corners[0]];
@@ -34,7 +34,7 @@ std::vector<Flat> flattened(std::span<const Vec3> vertices, std::span<const std:
   return flat;
 }
 
-// The corners that are left, as a ring.
+// The remaining corners, as a ring.
 class Ring {
  public:
   explicit Ring(std::vector<Flat> flat) : flat_(std::move(flat)), left_(flat_.size()) {
@@ -47,8 +47,8 @@ class Ring {
   }
   void cut(std::size_t k) { left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(k)); }
 
-  // Whether the corner may be cut off: it turns left, and no other corner is in its triangle. One in the same place as
-  // one of the three is at a seam and isn't in the way.
+  // Whether the corner may be cut off: it turns left, and no other corner is in its triangle. A corner in the same
+  // place as one of the triangle's is at a seam and doesn't count.
   [[nodiscard]] bool is_ear(std::size_t k) const noexcept {
     const auto [before, here, after] = at(k);
     const Flat &a = flat_[before], &b = flat_[here], &c = flat_[after];
@@ -61,7 +61,7 @@ class Ring {
     return true;
   }
 
-  // Twice the area of the triangle that a corner makes with its neighbours: 0 on their line, where it bounds nothing.
+  // Twice the area of the triangle that a corner makes with its neighbours: 0 if the three are in line.
   [[nodiscard]] long double turn_at(std::size_t k) const noexcept {
     const auto [before, here, after] = at(k);
     return turn(flat_[before], flat_[here], flat_[after]);

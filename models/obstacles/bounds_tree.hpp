@@ -1,5 +1,5 @@
-// A bounding-volume tree of axis-aligned boxes over many objects: which are near, and how near is the nearest? It is
-// built once; queries allocate nothing and may come from any thread.
+// A bounding-volume tree of axis-aligned boxes: which objects are near a point, and how far is the nearest? Queries
+// allocate nothing and may come from any thread.
 #pragma once
 
 #include <algorithm>
@@ -42,9 +42,9 @@ class BoundsTree {
     }
   }
 
-  // The least of distance(index) over all leaves, and at most `least`. Leaves are skipped whose box is no nearer than
-  // the best so far, unless x is in it. Precondition: distance(index) is no less than the distance of the leaf's box,
-  // but may be negative where x is in that.
+  // The least of `least` and distance(index) over all leaves. Skips leaves whose box is no nearer than the best so far,
+  // unless x is in the box. Precondition: distance(index) is at least the distance to the leaf's box; it may be
+  // negative if x is in the box.
   template <typename Distance>
   [[nodiscard]] double nearest(const Vec3& x, double least, Distance distance) const noexcept {
     if (nodes_.empty()) return least;
@@ -59,7 +59,7 @@ class BoundsTree {
         least = std::min(least, distance(node.index));
       } else {
         const bool left_first = distance2(nodes_[node.left].bounds, x) < distance2(nodes_[node.right].bounds, x);
-        stack[top++] = left_first ? node.right : node.left;  // the nearer one is looked at next
+        stack[top++] = left_first ? node.right : node.left;  // the nearer one is visited next
         stack[top++] = left_first ? node.left : node.right;
       }
     }
@@ -73,8 +73,8 @@ class BoundsTree {
     std::size_t index = 0;
     bool leaf = false;
   };
-  // The tree halves the number of leaves at each level, and a search leaves one node of each level on the stack. Ten
-  // thousand objects need 15 places; 2³² leaves, more than indices can name, would need 33.
+  // Each level halves the leaves, and a search keeps one node of each level. Ten thousand objects need 15 places; 2³²
+  // leaves, more than indices can name, would need 33.
   static constexpr int stack_depth_ = 80;
 
   static double distance2(const Bounds& b, const Vec3& x) noexcept {

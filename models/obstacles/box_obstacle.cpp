@@ -35,12 +35,13 @@ double BoxObstacle::rounding(const Vec3& x) const noexcept {
   return 16.0 * u * (x.lpNorm<1>() + centre_.lpNorm<1>() + half_.sum());
 }
 
-// Where the way from q to p is inside all three slabs: from `enter` (through face `face`) to `leave`.
+// The part of the way from q to p inside all three slabs: from `enter` (through face `face`) to `leave`.
 struct BoxObstacle::Crossing {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();
-  int face = -1;                   // the face that the way enters through; -1: q is inside
-  std::array<double, 6> enters{};  // of each face that q is outside of or on; negative where it isn't
+  int face = -1;                   // the face through which the way enters; -1: q is inside
+  std::array<double, 6> enters{};  // for each face: the fraction of the way that reaches its plane; negative unless q
+                                   // is on it or outside
 
   [[nodiscard]] bool any() const noexcept { return enter < leave && enter < 1.0 && leave > 0.0; }
 };
@@ -77,7 +78,7 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
   Crossing c = cross(q, p);
   if (!c.any()) return {p, Vec3::UnitZ(), 0, false, false};
   if (c.face < 0) {
-    // q is inside: out through the face next to it.
+    // q is inside: out through the nearest face.
     const Vec3 q_l = local(q);
     double least = std::numeric_limits<double>::infinity();
     for (int k = 0; k < 3; ++k) {
@@ -99,9 +100,9 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
     }
     return true;
   };
-  // The segment enters the box through the last plane that it crosses (slab method). So among the faces that hold the
-  // proxy, the one with the largest t counts; of several with the same t (q on an edge), the one on which the proxy
-  // ends nearest to p.
+  // The segment enters the box through the last plane that it crosses (slab method). So of the faces that hold the
+  // proxy, the one with the largest t counts; if several have the same t (q on an edge), the one that holds it nearest
+  // to p.
   Step best;
   double best_t = -1.0, best_distance = 0.0;
   for (int face = 0; face < 6; ++face) {
@@ -109,7 +110,7 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
     if (t < 0.0) continue;
     const FaceStep<3> s = step_on_layer(faces_[static_cast<std::size_t>(face)], mu_, layer_, K, p, q);
     if (!s.touches || !on_face(face, s.r)) continue;
-    const double distance = s.slips ? (s.r - p).norm() : 0.0;  // one that sticks is preferred
+    const double distance = s.slips ? (s.r - p).norm() : 0.0;  // sticking is preferred
     if (t > best_t || (t == best_t && distance < best_distance)) {
       best = {s.r, faces_[static_cast<std::size_t>(face)].normal(), face, true, s.slips};
       best_t = t;
@@ -121,8 +122,8 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
   return beside_face(c.face, K, p, q);
 }
 
-// The step would end beside the entered face. If p is past the same edge, nothing holds the proxy; otherwise the edge
-// does, or the corner at the edge's end.
+// The step ends beside the entered face. If p is past the same edge, the proxy is free; otherwise the edge holds it, or
+// the corner at the edge's end.
 Obstacle::Step BoxObstacle::beside_face(std::int32_t face, double K, const Vec3& p, const Vec3& q) const noexcept {
   const FlatSurface<3>& entered = faces_[static_cast<std::size_t>(face)];
   const StepOnPlanes step{mu_, K, layer_, p, q};
@@ -157,11 +158,11 @@ bool BoxObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
   const Vec3 r_l = local(r);
   if ((half_ - r_l.cwiseAbs()).minCoeff() > 2.0 * rounding(r) + layer_.thickness_m) return true;
   const Crossing c = cross(q, r);
-  return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;  // r is beyond, and the box doesn't let the proxy around
+  return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;  // r is beyond the box, and no way leads around
 }
 
-// In a convex solid the depth is a concave function, so at the middle of a chord it is at least half of the greatest
-// depth on the chord.
+// Depth in a convex solid is a concave function, so at the middle of a chord it is at least half of the chord's
+// greatest depth.
 bool BoxObstacle::bars(const Vec3& x, const Vec3& y) const noexcept {
   const Crossing c = cross(x, y);
   if (!c.any()) return false;
@@ -169,7 +170,7 @@ bool BoxObstacle::bars(const Vec3& x, const Vec3& y) const noexcept {
   return distance(middle) < -2.0 * rounding(middle);
 }
 
-// The proxy slides along the entered face, from where the straight way enters to the face's edge.
+// The proxy slides along the entered face, from the point of entry to the face's edge.
 Vec3 BoxObstacle::detour(const Vec3& p, const Vec3& q) const noexcept {
   const Crossing c = cross(q, p);
   if (!c.any() || c.face < 0 || step(1.0, p, q).touches) return q;

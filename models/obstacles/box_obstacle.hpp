@@ -1,8 +1,8 @@
 // A solid box.
 //
-// The proxy is held by the face through which its straight way enters, and slides on it by (4). Beyond the face's edge
-// it is free again: the space around a box isn't convex, so the proxy goes around the box. Where friction would hold a
-// proxy beside the entered face, beyond an edge that p isn't beyond, that edge holds it (edge_contact.hpp).
+// The face through which the proxy's straight way enters holds it by (4). Beyond the face's edge it is free again, so
+// it can go around the box. If friction would hold the proxy beside the entered face, beyond an edge that p isn't
+// beyond, that edge holds it (edge_contact.hpp).
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@ namespace proxarm::models {
 
 class BoxObstacle final : public Obstacle {
  public:
-  // size_m: full edge lengths, finite and positive (10 µm will do for a plate). X: of the box in W.
-  // Throws std::invalid_argument otherwise, and for a friction that isn't finite and ≥ 0.
+  // size_m: full edge lengths; a plate may be as thin as 10 µm. X: pose of the box in W. Throws std::invalid_argument
+  // for sizes that aren't finite and positive, and for a friction that isn't finite and ≥ 0.
   BoxObstacle(const Pose& X, const Vec3& size_m, double friction, const Layer& layer = {});
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
@@ -31,11 +31,11 @@ class BoxObstacle final : public Obstacle {
   [[nodiscard]] Bounds bounds() const noexcept override;
   void set_friction(double friction) noexcept override { mu_ = friction; }
 
-  // Faces 2 k and 2 k + 1: along +axis k and −axis k. Shared with boxes from inside.
+  // Faces 2 k and 2 k + 1 point along +axis k and −axis k. Boxes seen from inside use this too.
   static std::array<FlatSurface<3>, 6> faces(const Pose& X, const Vec3& size_m);
 
  private:
-  struct Crossing;  // of the straight way from q to p with the box
+  struct Crossing;  // where the straight way from q to p crosses the box
   [[nodiscard]] Crossing cross(const Vec3& q, const Vec3& p) const noexcept;
   [[nodiscard]] Step beside_face(std::int32_t face, double K, const Vec3& p, const Vec3& q) const noexcept;
   [[nodiscard]] Vec3 local(const Vec3& x) const noexcept { return axes_.transpose() * (x - centre_); }

@@ -1,7 +1,7 @@
 // A solid cylinder with flat ends.
 //
-// It works as a box does: the proxy is held by the side or the end through which it enters, slides there exactly, and
-// is free past the rim. A proxy that friction would hold beside that face is held at the rim (edge_contact.hpp).
+// It works like a box: the side or end through which the proxy enters holds it, and beyond the rim it is free. A proxy
+// that friction would hold beside that face is held at the rim (edge_contact.hpp).
 #pragma once
 
 #include "models/obstacles/plane_obstacle.hpp"
@@ -11,8 +11,8 @@ namespace proxarm::models {
 
 class CylinderObstacle final : public Obstacle {
  public:
-  // From the middle of one end to that of the other. Throws std::invalid_argument for ends that coincide, and for a
-  // radius or a friction that isn't finite or negative.
+  // from_m, to_m: the centres of the two ends. Throws std::invalid_argument if they coincide, and for a radius or a
+  // friction that isn't finite and ≥ 0.
   CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction, const Layer& layer = {});
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
@@ -46,7 +46,7 @@ class CylinderObstacle final : public Obstacle {
   Vec3 e_;
   double half_;
   double R_;
-  double depth_;  // of the layer
+  double depth_;  // the layer's thickness, m
   RoundBar side_;
   PlaneObstacle end_[2];  // far, near
 };

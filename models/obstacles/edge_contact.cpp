@@ -11,7 +11,7 @@ EdgeContact hold_at_edge(const Vec3& point, const Vec3& normal_1, const Vec3& no
   constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
   const double nothing = 4.0 * u * (point.lpNorm<1>() + step.q.lpNorm<1>());
   EdgeContact out{point, normal_1};
-  // How far beyond the edge the step on the plane n(θ) ends, towards the second face's side; `out` is its end.
+  // How far the step on the plane n(θ) ends beyond the edge, towards the second face's side. Leaves that end in `out`.
   const auto beyond = [&](double theta) {
     out.normal = std::cos(theta) * normal_1 + std::sin(theta) * normal_2;
     const Vec3 across = std::cos(theta) * normal_2 - std::sin(theta) * normal_1;
@@ -31,11 +31,11 @@ EdgeContact hold_at_edge(const Vec3& point, const Vec3& normal_1, const Vec3& no
 }
 
 // With f along r − p and d = r − q, (17) at a normal n says f/‖f‖ = cos β n − sin β v/‖v‖, tan β = μ, where v is the
-// part of d across n. So n and v/‖v‖ are f/‖f‖ and the direction across it towards d, both turned by β.
+// part of d across n. So n is the direction of f turned by β towards the part of d across f.
 EdgeContact hold_at_corner(const Vec3& r, double mu, const Vec3& p, const Vec3& q) noexcept {
   const Vec3 force = (r - p).normalized(), d = r - q;
   const double cos = 1.0 / std::sqrt(1.0 + mu * mu), sin = mu * cos;
-  const double against = -force.dot(d) / d.norm();  // the cosine of the angle between f and the way back
+  const double against = -force.dot(d) / d.norm();  // cosine of the angle between f and the way back
   if (against >= cos) return {r, -d.normalized()};
   const Vec3 aside = (d - force * force.dot(d)).normalized();
   return {r, cos * force + sin * aside, mu > 0.0};

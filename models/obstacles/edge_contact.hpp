@@ -1,11 +1,10 @@
-// A proxy that friction holds at a convex edge, or at a corner, of a solid.
+// Contact at a convex edge or corner of a solid where friction holds the proxy.
 //
-// Beyond a face's edge, its plane holds nothing. If a proxy comes from beside an edge, each of the two faces may take
-// it beyond that edge on its own plane, although p is inside. The proxy then meets the edge itself. Of the normals
-// between those of the faces, n(θ) = cos θ n₁ + sin θ n₂, the one applies for which (17), on the plane through the
-// edge, ends on the edge. As θ goes from 0 to 90°, that end moves from beyond the edge on one side to beyond it on the
-// other, so such a θ exists. There may be several (Coulomb's law leaves this open); the one nearest to the face that
-// was entered is taken.
+// A face's plane holds nothing beyond the face's edge. For a proxy that comes from beside an edge, the step on each of
+// the two planes may end beyond the edge, although p is inside. The edge itself then holds the proxy, with a normal
+// between those of the faces, n(θ) = cos θ n₁ + sin θ n₂: the one for which (17), on the plane through the edge, ends
+// on the edge. From θ = 0 to 90° that end moves from one side of the edge to the other, so such a θ exists. Coulomb's
+// law allows several; the one nearest to the entered face is taken.
 #pragma once
 
 #include <cmath>
@@ -19,13 +18,13 @@ struct EdgeContact {
   Vec3 r;
   Vec3 normal;  // unit
   bool slips = false;
-  bool found = true;  // false: r is that point, but doesn't satisfy (17)
+  bool found = true;  // false: r is on the edge, but doesn't satisfy (17)
 };
 
-// The data of a step that is to be solved on several planes.
+// The data of a step that is solved on several planes.
 struct StepOnPlanes {
   double mu, K;
-  Layer layer;  // a copy: cylinders hand over what their end returns
+  Layer layer;  // a copy: a cylinder passes a temporary
   const Vec3 &p, &q;
 
   [[nodiscard]] FaceStep<3> on(const FlatSurface<3>& surface) const noexcept {
@@ -33,9 +32,9 @@ struct StepOnPlanes {
   }
 };
 
-// Solves error(x) = 0 between low, where it is positive, and high, where it is negative, by false position (the
-// Illinois variant) with a bisection every fourth step. It ends when |error| ≤ `nothing` or no double is left between.
-// Returns false if the errors at the ends have other signs, or if error(x) jumps past zero by more than `near`.
+// Solves error(x) = 0 by false position (the Illinois variant) with a bisection every fourth step. Expects error > 0 at
+// low and error < 0 at high, and returns false otherwise. Ends when |error| ≤ `nothing` or no double is left between.
+// Returns false if error(x) jumps past zero by more than `near`.
 template <typename Error>
 bool false_position(Error error, double low, double high, double nothing, double near) noexcept {
   double at_high = error(high);
@@ -58,14 +57,13 @@ bool false_position(Error error, double low, double high, double nothing, double
   return std::abs(now) <= near;
 }
 
-// Holds the proxy at the straight edge through `point` in which two faces meet at a right angle, by the solution
-// nearest to the first face.
-// Precondition: p is behind both faces, and the step on the first ends beyond the edge.
+// Holds the proxy at the straight edge through `point` where two faces meet at a right angle, with the normal nearest
+// to the first face's. Precondition: p is behind both faces, and the step on the first ends beyond the edge.
 EdgeContact hold_at_edge(const Vec3& point, const Vec3& normal_1, const Vec3& normal_2,
                          const StepOnPlanes& step) noexcept;
 
-// Holds the proxy at the corner r itself, by the normal for which the force is on the edge of the friction cone against
-// the slip. Or it sticks there, if the direction back to q can be the normal. Precondition: r is neither p nor q.
+// Holds the proxy at the corner r. It sticks if the direction back to q can be the normal. Otherwise the normal puts
+// the force on the edge of the friction cone, against the slip. Precondition: r is neither p nor q.
 EdgeContact hold_at_corner(const Vec3& r, double mu, const Vec3& p, const Vec3& q) noexcept;
 
 }  // namespace proxarm::models

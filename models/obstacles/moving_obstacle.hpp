@@ -1,14 +1,13 @@
-// An obstacle that moves: by a script, or driven from outside.
+// An obstacle that moves by a script or is driven from outside.
 //
-// The object's own motion carries the previous proxy along before it is used as q(k−1): in the object's frame q is
-// X(t − T)⁻¹ q, and p is X(t)⁻¹ p. Everything else happens in that frame, where the object stands still. So friction
-// acts against the relative motion, and the object can sweep onto a resting proxy; this holds for rigid surfaces and
-// for elastic layers.
+// The step happens in the object's frame, where the object stands still. q there is X(t − T)⁻¹ q, carried along by the
+// object's motion, and p is X(t)⁻¹ p. So friction acts against the relative motion, and the object can sweep onto a
+// resting proxy, with rigid surfaces and elastic layers alike.
 //
-// A mesh has no inside from which it could bring a proxy back, so rounding between its frame and W must never take the
-// proxy through a face. Three things see to that: the surface that the proxy touches is in front of the faces by more
-// than this rounding (Obstacle::set_rounding_size); a point in W is returned only after it has been taken back to the
-// object's frame and tested; and each step starts, bit for bit, from the pose to which the step before it went.
+// A mesh can't push back a proxy that got behind a face, so rounding between its frame and W must never take the proxy
+// through one. The touched surface is in front of the faces by more than this rounding (Obstacle::set_rounding_size). A
+// point in W is returned only after a test of its image in the object's frame. And each step starts, bit for bit, from
+// the pose at which the last step ended.
 #pragma once
 
 #include <memory>
@@ -20,27 +19,27 @@ namespace proxarm::models {
 
 class MovingObstacle final : public Obstacle {
  public:
-  // `still`: the object at rest, where it was described.
+  // `still`: the object at the place where the scene describes it.
   MovingObstacle(std::unique_ptr<Obstacle> still, const ScriptedMotion& motion)
       : still_(std::move(still)), motion_(motion), scripted_(true) {
     last_ = now_ = motion_.at(0.0);
     go_from(now_);
   }
-  // A driven object, which stands at `start` until drive() is called.
+  // A driven object; it stands at `start` until drive() is called.
   MovingObstacle(std::unique_ptr<Obstacle> still, const Pose& start)
       : still_(std::move(still)), now_(orthonormalised(start)), driven_from_(now_) {
     go_from(now_);
   }
 
-  // Sets the pose for the next step; the object moves there from the pose of the last call. To be called once before
-  // each step. A rotation that isn't orthonormal to within rounding is made so.
+  // Sets the pose for the next step; the object moves there from the pose of the last call. Call it once before each
+  // step. A rotation that isn't orthonormal within rounding is made so.
   void drive(const Pose& X) noexcept {
     driven_from_ = now_;
     now_ = orthonormalised(X);
     go_from(driven_from_);
   }
 
-  // Order 2 asks a second time for the same time, from q̃ and over a shorter period: see from().
+  // At order 2 it is called a second time for the same time, with a shorter period: see from().
   void set_time(double time_s, double period_s) noexcept override;
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
@@ -53,7 +52,7 @@ class MovingObstacle final : public Obstacle {
   [[nodiscard]] std::size_t contacts(double K, const Vec3& p, const Vec3& q, const Step& s,
                                      std::array<Contact<3>, 3>& out) const noexcept override;
 
-  // Precondition: q has been carried along already, as World does.
+  // Precondition: q has been carried along already; World does that.
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     return still_->excludes(now_inverse_ * q, now_inverse_ * r);
   }
@@ -97,13 +96,13 @@ class MovingObstacle final : public Obstacle {
   bool scripted_ = false;
   Pose now_ = Pose::Identity();
   Pose now_inverse_ = Pose::Identity(), before_inverse_ = Pose::Identity();
-  bool rests_ = true;  // both poses are the same
-  // The pose before: of a scripted object at the previous time, of a driven one at the previous call of drive().
+  bool rests_ = true;  // both poses are equal
+  // The pose before this step: a scripted object's at the last time, a driven object's at the last call of drive().
   Pose last_ = Pose::Identity(), driven_from_ = Pose::Identity();
   double time_s_ = 0.0, last_time_s_ = 0.0;
   double whole_period_s_ = 0.0;
   bool shortened_ = false;
-  mutable Vec3 whole_from_ = Vec3::Zero();  // the last result of from() for a whole period
+  mutable Vec3 whole_from_ = Vec3::Zero();  // last result of from() for a whole period
 };
 
 }  // namespace proxarm::models

@@ -1,4 +1,4 @@
-// A half-space among other obstacles: (2) and (4), with an elastic layer if there is one.
+// A half-space among other obstacles: (2) and (4), optionally with an elastic layer.
 #pragma once
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace proxarm::models {
 
 class PlaneObstacle final : public Obstacle {
  public:
-  // Throws std::invalid_argument as FrictionPlane does.
+  // Throws std::invalid_argument for a normal without a direction or a friction that isn't finite and ≥ 0.
   PlaneObstacle(const Vec3& point_m, const Vec3& normal, double friction, const Layer& layer = {})
       : surface_(point_m, normal), mu_(friction), layer_(layer) {
     if (!std::isfinite(friction) || !(friction >= 0.0)) {
@@ -40,9 +40,9 @@ class PlaneObstacle final : public Obstacle {
   }
   [[nodiscard]] double distance(const Vec3& x) const noexcept override { return surface_.height(x); }
   void set_friction(double friction) noexcept override { mu_ = friction; }
-  // How many units of rounding a point may be behind the surface and still be allowed. One is right for a surface by
-  // itself. Two half-spaces back to back (a plane guide) need more, about 8: a point on the one is behind the other by
-  // the rounding of both. Beyond 500 (1e-12 m within a metre) the contract's "never inside" would not hold.
+  // A point may be behind the surface by this many units of rounding: 1 for a single surface, about 8 for two
+  // half-spaces back to back (a plane guide), where a point on one is behind the other by the rounding of both. Beyond
+  // 500 (1e-12 m within a metre) the contract's "never inside" would fail.
   void set_slack(double roundings) noexcept { slack_ = roundings; }
   [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
 

@@ -1,22 +1,21 @@
-// Spheres, capsules and round bars, solid or seen from inside: all points at a distance R from a core, which is a
-// point, a segment or a line. R may be zero.
+// Spheres, capsules and round bars, solid or seen from inside: the points at distance R ≥ 0 from a core, which is a
+// point, a segment or a line.
 //
 // The normal at r lies along the line from the core through r. In units where K = 1, friction is −λ N Nᵀ (r − q) with
 // an unknown λ ≥ 0, so the tangential balance is
 //   N Nᵀ [(r − p) + λ (r − q)] = (1 + λ) N Nᵀ (r − p') = 0   with p' = (p + λ q)/(1 + λ):
-// r is the point of the surface nearest to p', as it is nearest to p without friction. With s = 1/(1 + λ), p' = q + s
-// (p − q), and the friction cone leaves one scalar equation for s:
-//   r(s) = nearest to q + s (p − q),   ‖f_t(r(s))‖ = μ f_n(r(s)),   0 ≤ s ≤ 1,
-// where s = 1 is frictionless and s = 0 is stick (r nearest to q). On a plane the equation is linear in s and gives
-// (4). It is solved by the secant method, safeguarded by bisection.
+// r is the surface point nearest to p', as without friction it is nearest to p. With s = 1/(1 + λ), p' = q + s (p − q),
+// and the friction cone leaves one scalar equation for s:
+//   r(s) = nearest to q + s (p − q),   ‖f_t(r(s))‖ = μ f_n(r(s)),   0 ≤ s ≤ 1.
+// s = 1 is frictionless, s = 0 is stick (r nearest to q). On a plane the equation is linear in s and gives (4). The
+// secant method, safeguarded by bisection, solves it.
 //
-// Where the way from q to p passes close to the core, at o = q + s₀ (p − q), r turns around within a part of about
-// σ = ‖o − core‖/‖p − q‖ of the way, which may be tiny. So coordinates are taken relative to o, the unknown is
-// t = s − s₀, and bisection halves asinh(t/σ). A way through the core itself lets r jump over to p's side, where the
-// proxy sticks: N(r − q) = 0.
+// If the way from q to p passes close to the core, at o = q + s₀ (p − q), r turns around within about a fraction σ =
+// ‖o − core‖/‖p − q‖ of the way, which may be tiny. So coordinates are relative to o, the unknown is t = s − s₀, and
+// bisection halves asinh(t/σ). If the way passes through the core itself, r jumps to p's side and the proxy sticks
+// there: N(r − q) = 0.
 //
-// The space around a solid body isn't convex: if p is past the body, the proxy sticks if it can, and otherwise goes
-// around.
+// The space around a solid isn't convex: if p is past the solid, the proxy sticks if it can, and otherwise goes around.
 #pragma once
 
 #include <algorithm>
@@ -28,13 +27,13 @@
 
 namespace proxarm::models {
 
-// The t, 0 ≤ t ≤ 1, at which the way q + t d is closest to a point.
+// The t, 0 ≤ t ≤ 1, at which q + t d is closest to a point.
 inline double closest_to_point(const Vec3& q, const Vec3& d, const Vec3& x) noexcept {
   const double length2 = d.squaredNorm();
   return length2 > 0.0 ? std::clamp(d.dot(x - q) / length2, 0.0, 1.0) : 0.0;
 }
 
-// The same for the endless line through a along e (unit). Where they are parallel, every t is as good: 0.
+// The same for the infinite line through a along e (unit); 0 if d is parallel to it.
 inline double closest_to_line(const Vec3& q, const Vec3& d, const Vec3& a, const Vec3& e) noexcept {
   const Vec3 across = d - e * e.dot(d);
   return closest_to_point(q, across, q + (a - q) - e * e.dot(a - q));
@@ -58,8 +57,8 @@ struct SegmentCore {
       : a(from), end((to - from).norm()), e(end > 0.0 ? Vec3((to - from) / end) : Vec3(Vec3::UnitZ())) {}
 
   [[nodiscard]] Vec3 nearest(const Vec3& x) const noexcept { return a + std::clamp(e.dot(x - a), begin, end) * e; }
-  // The distance from a segment is that from its line or from one of its ends. Each of the three has a single minimum
-  // along the way, and the least of them is the answer.
+  // The distance to a segment is the distance to its line or to one of its ends. Each of these has a single minimum
+  // along the way; the least is the answer.
   [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
     double best = 0.0, least = std::numeric_limits<double>::infinity();
     for (const double t :
@@ -79,8 +78,8 @@ struct SegmentCore {
     const Vec3 b = a + end * e;
     return {a.cwiseMin(b), a.cwiseMax(b)};
   }
-  // The core relative to `origin`. The reference point is moved along the line to the point nearest to `origin`, so
-  // that a far end brings no rounding into coordinates near it.
+  // The core relative to `origin`. Moves the reference point along the line to the point nearest to `origin`, so that a
+  // distant end adds no rounding to coordinates near it.
   [[nodiscard]] SegmentCore seen_from(const Vec3& origin) const noexcept {
     SegmentCore core = *this;
     const double ahead = e.dot(origin - a);
@@ -91,11 +90,11 @@ struct SegmentCore {
   }
 
   Vec3 a;
-  double begin = 0.0, end;  // along e, from a
+  double begin = 0.0, end;  // along e, relative to a
   Vec3 e;
 };
 
-// A line that is endless along e. A cylinder's side has this core; its ends cut it off.
+// An infinite line along e: the core of a cylinder's side, which the cylinder's ends cut off.
 struct LineCore {
   Vec3 a = Vec3::Zero();
   Vec3 e = Vec3::UnitZ();  // unit
@@ -115,8 +114,8 @@ struct LineCore {
 template <typename Core>
 class RoundObstacle final : public Obstacle {
  public:
-  // inside: the free side is towards the core. With R = 0 the proxy is then held on the core itself, as on a guide.
-  // Throws std::invalid_argument for a radius or a friction that isn't finite and ≥ 0.
+  // inside: the free side is towards the core. With R = 0 the core itself then holds the proxy, like a guide. Throws
+  // std::invalid_argument for a radius or a friction that isn't finite and ≥ 0.
   RoundObstacle(const Core& core, double radius_m, double friction, bool inside, const Layer& layer = {})
       : core_(core), R_(radius_m), mu_(friction), sign_(inside ? -1.0 : 1.0), layer_(layer) {
     if (!std::isfinite(radius_m) || !(radius_m >= 0.0)) {
@@ -136,7 +135,7 @@ class RoundObstacle final : public Obstacle {
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     const double hard = at(core_, r, q).height + (layer_.soft() ? layer_.thickness_m : 0.0);
     if (hard < -4.0 * rounding(r)) return true;
-    return sign_ > 0.0 && passes(q, r) && step(1.0, r, q).touches;  // beyond it, and it would have held the proxy
+    return sign_ > 0.0 && passes(q, r) && step(1.0, r, q).touches;  // r is beyond a solid that would have held it
   }
 
   [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override {
@@ -160,10 +159,10 @@ class RoundObstacle final : public Obstacle {
   [[nodiscard]] double friction() const noexcept { return mu_; }
 
  private:
-  // A point, seen from the core.
+  // A point x as seen from the core.
   struct At {
-    Vec3 foot;      // the point of the core next to it
-    Vec3 normal;    // of the surface next to it
+    Vec3 foot;      // the core's point nearest to x
+    Vec3 normal;    // the surface's normal nearest to x
     double height;  // above the surface, positive on the free side
   };
 
@@ -174,7 +173,7 @@ class RoundObstacle final : public Obstacle {
     double excess = 0.0;  // ‖f_t‖ − μ f_n, over K
   };
 
-  // On the core itself every direction is a normal: the one towards `other` is taken.
+  // On the core every direction is a normal; the one towards `other` is taken.
   [[nodiscard]] At at(const Core& core, const Vec3& x, const Vec3& other) const noexcept {
     const Vec3 foot = core.nearest(x);
     Vec3 d = x - foot;
@@ -191,20 +190,20 @@ class RoundObstacle final : public Obstacle {
     return {foot, (sign_ / distance) * d, sign_ * (measured - R_)};
   }
 
-  // As FlatSurface::rounding, with the core in the place of the point. Its reserve also pays for the square root here.
+  // As FlatSurface::rounding, with the core instead of the point. Its reserve also covers the square root here.
   [[nodiscard]] double rounding(const Vec3& x) const noexcept {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
     return 16.0 * u * (x.lpNorm<1>() + core_.size() + R_);
   }
 
-  // The proxy on the line through `line.foot` along `line.normal`: on the surface, or within a layer where the forces
+  // The proxy on the line through `line.foot` along `line.normal`: on the surface, or, within a layer, where the forces
   // along the normal balance.
   [[nodiscard]] Trial place(double K, const Vec3& p, const At& line) const noexcept {
     const Vec3& n = line.normal;
-    const double along_p = n.dot(p - line.foot);  // of p, from the core along the normal
+    const double along_p = n.dot(p - line.foot);  // p's coordinate along the normal, from the core
     double along = sign_ * R_;
     if (layer_.soft()) {
-      // K (along − along_p) = k (surface − along), no deeper than the layer.
+      // K (along − along_p) = k (surface − along), limited to the layer's thickness.
       const double k = layer_.stiffness_N_per_m;
       along = std::max((K * along_p + k * along) / (K + k), along - layer_.thickness_m);
     }
@@ -218,9 +217,9 @@ class RoundObstacle final : public Obstacle {
     return trial;
   }
 
-  // Solves ‖f_t‖ = μ f_n for t = s − s₀. The excess ‖f_t‖ − μ f_n is −μ f_n at s = 1, where no tangential force is
-  // left, and `excess_at_q` > 0 at s = 0; these bracket the root. In between it is nearly linear (on a plane exactly),
-  // so the secant method takes a few steps.
+  // Solves ‖f_t‖ = μ f_n for t = s − s₀. The excess ‖f_t‖ − μ f_n brackets the root: −μ f_n at s = 1, without
+  // tangential force, and `excess_at_q` > 0 at s = 0. In between it is nearly linear (on a plane exactly), so the
+  // secant method takes a few steps.
   [[nodiscard]] Step slide(double K, const Vec3& p, const Vec3& q, double excess_at_q) const noexcept;
 
   [[nodiscard]] Trial judge(const Vec3& p, const Vec3& r, const Vec3& n) const noexcept {

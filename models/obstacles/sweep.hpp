@@ -1,14 +1,14 @@
-// How far a point gets on a straight way before an obstacle stops it.
+// How far a point gets along a straight way before an obstacle stops it.
 #pragma once
 
 #include "models/obstacles/obstacle.hpp"
 
 namespace proxarm::models {
 
-// The last point on the way from x to `barred` that can be reached, by bisection down to neighbouring doubles.
-// Precondition: the obstacle bars the way from x to `barred`.
+// The last reachable point on the way from x to `barred`, by bisection down to neighbouring doubles. Precondition: the
+// obstacle bars this way.
 inline Vec3 sweep(const Obstacle& obstacle, const Vec3& x, Vec3 barred) noexcept {
-  // From a metre down to the least double, 2⁻¹⁰⁷⁴ m, bisection takes 1074 steps; it mostly ends after some 50.
+  // Bisection from a metre down to the least double, 2⁻¹⁰⁷⁴ m, takes 1074 steps; about 50 are usual.
   constexpr int most_halvings = 1100;
   Vec3 end = x;
   for (int k = 0; k < most_halvings; ++k) {

@@ -1,14 +1,13 @@
-// Can several contacts together bear a force? Membership in a sum of circular cones, decided without iteration.
+// Can several contacts together bear a force? Tests membership in a sum of circular cones, without iteration.
 //
-// A sticking contact can bear any force of its friction cone. A slipping contact bears only the edge of its cone that
-// points against the motion: a half-line, which is a cone with μ = 0. Together they can bear
+// A sticking contact can bear any force of its friction cone. A slipping contact bears only the edge of its cone
+// against the motion: a half-line, which is a cone with μ = 0. Together they can bear
 //   C = C₁ + C₂ + …,   C_i = {f | ‖f − a_i a_iᵀf‖ ≤ μ_i a_iᵀf}.
 //
 // C is closed unless cones oppose each other. By the separating-hyperplane theorem, f ∈ C ⟺ yᵀf ≥ 0 for all y of the
-// dual cone C* = ∩ C_i*. Each dual is circular about the same axis: C_i* = {y | a_iᵀy ≥ sin β_i ‖y‖}, tan β_i = μ_i. On
-// the unit sphere C* is therefore an intersection of caps, and the least yᵀf over it lies at one of few points: at
-// −f/‖f‖, at the point of one cap farthest from f, or where the edges of two caps meet. f ∈ C if none of these points
-// is in all caps and has yᵀf < 0.
+// dual cone C* = ∩ C_i*. Each dual is circular about the same axis: C_i* = {y | a_iᵀy ≥ sin β_i ‖y‖}, tan β_i = μ_i. So
+// on the unit sphere C* is an intersection of caps, and the minimum of yᵀf lies at −f/‖f‖, at the point of one cap
+// farthest from f, or where two caps' edges meet. f ∈ C unless one of these points is in all caps and has yᵀf < 0.
 #pragma once
 
 #include <cmath>
@@ -38,8 +37,8 @@ inline bool in_all_caps(const Vec3& y, std::span<const ForceCone> cones, std::si
 
 }  // namespace detail
 
-// f ∈ C within tolerance_N (the distance of f from C that is forgiven). Meant for up to a handful of cones: the time
-// grows with the cube of their number. Precondition: axes of unit length, μ ≥ 0.
+// Whether f is within tolerance_N of C. Meant for a handful of cones: the time grows with the cube of their number.
+// Precondition: axes of unit length, μ ≥ 0.
 inline bool in_sum_of_cones(const Vec3& f, std::span<const ForceCone> cones, double tolerance_N) noexcept {
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   const double size = f.norm();
@@ -52,8 +51,8 @@ inline bool in_sum_of_cones(const Vec3& f, std::span<const ForceCone> cones, dou
     const double f_n = a.dot(f);
     const Vec3 f_t = f - a * f_n;
     const double f_t_size = f_t.norm();
-    // The cap's point farthest from f, where yᵀf = f_n sin β − ‖f_t‖ cos β. (Computed as y.dot(f), this would be wrong
-    // by u ‖f‖²/‖f_t‖ where f is nearly along the axis.)
+    // The cap's point farthest from f, where yᵀf = f_n sin β − ‖f_t‖ cos β. (y.dot(f) would have an error of u
+    // ‖f‖²/‖f_t‖ for f nearly along the axis.)
     if (sin_beta * f_n - cos_beta * f_t_size < -tolerance_N) {
       Vec3 away = f_t_size > 0.0 ? Vec3(f_t / -f_t_size) : a.unitOrthogonal();
       away = (away - a * a.dot(away)).normalized();
@@ -65,7 +64,7 @@ inline bool in_sum_of_cones(const Vec3& f, std::span<const ForceCone> cones, dou
       // y = α a + γ b ± ω c with aᵀy = sin β_i, bᵀy = sin β_j, ‖y‖ = 1, c along a × b.
       const Vec3 cross = a.cross(b);
       const double sin2 = cross.squaredNorm(), cos = a.dot(b);
-      if (!(sin2 > 1e-30)) continue;  // the same axis (one cap holds the other) or opposite ones (no edges meet)
+      if (!(sin2 > 1e-30)) continue;  // equal axes (one cap contains the other) or opposite axes (no edges meet)
       const double alpha = (sin_beta - cos * sin_beta_j) / sin2, gamma = (sin_beta_j - cos * sin_beta) / sin2;
       const double rest = 1.0 - alpha * sin_beta - gamma * sin_beta_j;
       if (rest < 0.0) continue;  // the caps' edges don't meet

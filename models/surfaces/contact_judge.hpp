@@ -1,9 +1,9 @@
-// Can the contacts that a 𝒢 reports bear its force? `proxarm check`, the stress study and the contract tests judge
-// forces by this. The cycle doesn't need it.
+// Can the contacts that a 𝒢 reports bear its force? For `proxarm check`, the stress study and the contract tests; the
+// cycle doesn't need it.
 //
-// By (17), the force f = K (r − p) must be a sum of one force for each contact: of its friction cone if the contact
-// sticks, of the cone's edge against N Nᵀ (r − q) if it slips. So these are the cones to pass to in_sum_of_cones
-// (cone_sum.hpp); how much rounding to forgive is up to the caller, who knows its world.
+// By (17), the force f = K (r − p) must be a sum of forces, one per contact: in the friction cone of a sticking
+// contact, on the cone's edge against N Nᵀ (r − q) of a slipping one. in_sum_of_cones (cone_sum.hpp) tests this; the
+// caller, who knows its world, chooses the tolerance for rounding.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@
 
 namespace proxarm::models {
 
-// The factor by which contacts amplify rounding: nearly parallel ones by one over the sine of their angle. 4 for a
-// single contact, at most 4e8.
+// The factor by which contacts amplify rounding: 4 for a single contact; for nearly parallel contacts 4 over the sine
+// of their angle, at most 4e8.
 template <int N>
 double rounding_amplification(std::span<const Contact<N>> contacts) {
   double least = 1.0;
@@ -32,10 +32,9 @@ double rounding_amplification(std::span<const Contact<N>> contacts) {
   return 4.0 / std::max(least, 1e-8);
 }
 
-// How far the proxy slid along contacts that are reported to stick, metres. (17) lets such a contact bear any force of
-// its cone because N Nᵀ (r − q) = 0 there. So a wall that creeps isn't detected by its forces, but by this distance.
-// Contacts without friction, or with unknown friction, are left out, and so are those that the proxy slid to over other
-// faces (Contact::reached). Arguments as below.
+// The largest distance (m) that the proxy slid along a contact that is reported to stick. Only this reveals a wall that
+// creeps: (17) lets such a contact bear any force of its cone because N Nᵀ (r − q) = 0 there. Skips contacts with no or
+// unknown friction and those reached over other faces (Contact::reached). Arguments as for cones_of_contacts().
 template <int N, typename Friction, typename Motion>
 double creep_m(std::span<const Contact<N>> contacts, Friction friction, Motion motion) {
   double most = 0.0;
@@ -49,12 +48,12 @@ double creep_m(std::span<const Contact<N>> contacts, Friction friction, Motion m
 }
 
 // The cone of forces that each contact can bear.
-//   size_m                the size of the coordinates that r and q are rounded by
-//   friction(contact)     μ; nullopt if it isn't known: then any force that doesn't pull is accepted
-//   motion(contact)       r − q as the contact's object sees it (q carried along where the object moves), in 3D
-//   slipping(μ, angle)    is called for each slipping contact: the direction of its slip, and so of its force, is only
-//                         known to `angle` (rad), the rounding of r and q over the slip's length
-// Where the direction is known less well than to 1e-3 rad, the contact counts as sticking: its whole cone.
+//   size_m                the size of the coordinates by which r and q are rounded
+//   friction(contact)     μ, or nullopt if unknown: then any force that doesn't pull is accepted
+//   motion(contact)       r − q in 3D as the contact's object sees it: q is carried along with a moving object
+//   slipping(μ, angle)    is called for each slipping contact; rounding of r and q leaves the direction of the slip,
+//                         and so of the force, uncertain by `angle` (rad)
+// If the direction is uncertain by more than 1e-3 rad, the contact counts as sticking and gets its whole cone.
 template <int N, typename Friction, typename Motion, typename Slipping>
 std::vector<ForceCone> cones_of_contacts(std::span<const Contact<N>> contacts, double size_m, Friction friction,
                                          Motion motion, Slipping slipping) {

@@ -1,15 +1,14 @@
-// Which of a few contacts hold the proxy? The active-set search of all worlds.
+// Which of a few contacts hold the proxy? The active-set search that all worlds share.
 //
 // A step that meets several surfaces ends at a point that one, two or three of them hold together; the others don't
-// act. This is an active-set search: sets of contacts are tried by size, single ones first, until one is complete. A
-// set is complete if nothing pulls, nothing is penetrated, and friction is as (17) says for each contact. A trial that
-// runs into a further surface makes that a candidate, and the search starts again. Three contacts determine a point, so
-// larger sets add nothing if all are rigid; elastic layers share their force by another method
-// (models/world/shared_support.hpp).
+// act. The search tries sets of contacts, the smallest first, until one is complete: no contact pulls, nothing is
+// penetrated, and each contact's friction obeys (17). A surface that a trial runs into becomes a candidate, and the
+// search starts again. Three rigid contacts determine a point, so larger sets add nothing. Elastic layers share their
+// force differently (models/world/shared_support.hpp).
 //
-// What a trial solves differs from world to world (planes, tangent planes of curved surfaces, faces of a mesh) and is
-// up to the caller. The order of the sets is the same everywhere: by the candidates' numbers, with the greatest number
-// in the outermost loop, so that results depend on nothing but the order of the candidates.
+// The caller solves the trials: on planes, tangent planes of curved surfaces, faces of a mesh. Sets are ordered by the
+// candidates' numbers, with the greatest number in the outermost loop, so results depend only on the order of the
+// candidates.
 #pragma once
 
 #include <cstddef>
@@ -20,16 +19,14 @@
 
 namespace proxarm::models {
 
-// What a stage of the search has achieved.
 enum class StepResult {
-  no_progress,  // no set of this size is complete: larger ones are next
-  progress,     // a candidate was added, or the proxy has moved: single contacts are next
-  arrived,      // a complete set is found
+  no_progress,  // no set of this size is complete: try larger ones
+  progress,     // a candidate was added, or the proxy has moved: start again with single contacts
+  arrived,      // a complete set was found
 };
 
-// Runs the stages (singles, pairs, triples, …; each returns a StepResult) until one arrives or none makes progress.
-// `begin_round` is called before the first stage of each round; the search ends without a result where it returns
-// false.
+// Runs the stages (singles, pairs, triples, …) until one arrives or all make no progress. Returns whether one arrived.
+// Calls `begin_round` before each round's first stage and gives up if that returns false.
 template <typename BeginRound, typename... Stages>
 bool search_contacts(BeginRound begin_round, Stages... stages) noexcept {
   StepResult result = StepResult::progress;
@@ -40,7 +37,7 @@ bool search_contacts(BeginRound begin_round, Stages... stages) noexcept {
   return result == StepResult::arrived;
 }
 
-// Calls attempt(i, j), i < j < count, for all pairs of candidates, until it returns something else than no_progress.
+// Calls attempt(i, j), i < j < count, for all pairs of candidates, until it returns something other than no_progress.
 // `count` may grow meanwhile: pairs with a new candidate come last.
 template <typename Attempt>
 StepResult try_each_pair(const std::size_t& count, Attempt attempt) noexcept {
@@ -67,14 +64,14 @@ StepResult try_each_triple(const std::size_t& count, Attempt attempt) noexcept {
   return StepResult::no_progress;
 }
 
-// The best of several complete sets of one size: the one that leaves the proxy nearest to p. Where Coulomb's law has
-// several solutions this is the choice that depends least on K.
+// The best of several complete sets of one size: the one that leaves the proxy nearest to p. If Coulomb's law has
+// several solutions, this one depends least on K.
 struct NearestSet {
   double distance2 = std::numeric_limits<double>::infinity();  // ‖r − p‖²
   Vec3 r = Vec3::Zero();
 
   [[nodiscard]] bool found() const noexcept { return distance2 < std::numeric_limits<double>::infinity(); }
-  // Takes `at` if it is better than the best so far. Returns true if so; the caller then notes its contacts.
+  // Takes `at` and returns true if it is better than the best so far; the caller then notes its contacts.
   bool improve(const Vec3& p, const Vec3& at) noexcept {
     const double d2 = (at - p).squaredNorm();
     if (!(d2 < distance2)) return false;
@@ -82,7 +79,7 @@ struct NearestSet {
     r = at;
     return true;
   }
-  // The result of a stage that has tried all sets of its size.
+  // The result of a stage that has tried all sets of its size; `grew`: a candidate was added.
   [[nodiscard]] StepResult result(bool grew) const noexcept {
     return found() ? StepResult::arrived : grew ? StepResult::progress : StepResult::no_progress;
   }

@@ -7,7 +7,7 @@ namespace proxarm::models {
 CornerPoint::CornerPoint(const FlatSurface<3>& a, const FlatSurface<3>& b, const FlatSurface<3>& c) noexcept {
   const Vec3 bc = b.normal().cross(c.normal()), ca = c.normal().cross(a.normal()), ab = a.normal().cross(b.normal());
   const double volume = a.normal().dot(bc);
-  // The triple product of unit vectors is rounded by a few 1e-16: below 1e-14 the corner has less than two digits.
+  // Rounding of the unit vectors' triple product is a few 1e-16: below 1e-14 the corner has less than two digits.
   exists = std::abs(volume) > 1e-14;
   if (!exists) return;
   dual.row(0) = bc / volume;
@@ -32,7 +32,8 @@ CornerSolution solve_corner(const std::array<PlaneContact, 3>& contacts, const C
     const double speed = v.norm(), own_rounding = surface.rounding(q) + surface.rounding(p);
     rounding += own_rounding;
     in_place = in_place && surface.holds(q);
-    // The corner is known to the rounding of heights times ‖dual‖, which grows as one over the angle between faces.
+    // The corner's position is uncertain by the rounding of heights times ‖dual‖, which grows as one over the angle
+    // between faces.
     const bool rests = speed <= own_rounding * corner.dual.norm();
     out.slips[i] = !rests && mu > 0.0;
     at_rest = at_rest && rests;
@@ -43,8 +44,7 @@ CornerSolution solve_corner(const std::array<PlaneContact, 3>& contacts, const C
     }
   }
   const double tolerance = rounding * corner.dual.norm();
-  // A force within the cone of the normals needs no friction. Where all contacts rest, this is the most common case,
-  // and it is cheap.
+  // A force in the cone of the normals needs no friction. For three resting contacts this cheap test usually decides.
   const Vec3 shares = corner.dual * f;
   out.found = (at_rest && shares.minCoeff() >= 0.0) || in_sum_of_cones(f, cones, tolerance);
   // A proxy that was in the corner and sticks there is returned bit for bit.

@@ -1,9 +1,9 @@
-// Dry friction everywhere in space, equation (3): the world lets the proxy move only against a force of F.
+// Dry friction everywhere in space, equation (3): the proxy moves only against a force F.
 //
 //   𝒢(K, p, q) = q                                  if ‖p − q‖ ≤ F/K
 //                p − (F/K) (p − q)/‖p − q‖          if ‖p − q‖ > F/K        (3)
 //
-// F > 0 in N is the kinetic and the greatest static friction force. ℳ is (16). Put into (23) and (26), this is the
+// F > 0 in N is both the kinetic and the greatest static friction force. ℳ is (16). With (23) or (26) this gives the
 // friction model of the paper's reference [14].
 #pragma once
 
@@ -17,7 +17,7 @@ namespace proxarm::models {
 template <int N>
 class CoulombField final : public GeometricAlgorithm<N> {
  public:
-  // Throws std::invalid_argument unless force_N is finite and positive; without friction there is no field to build.
+  // Throws std::invalid_argument unless force_N is finite and positive.
   explicit CoulombField(double force_N) : F_(force_N) {
     if (!std::isfinite(force_N) || !(force_N > 0.0)) {
       throw std::invalid_argument("the force of a Coulomb field must be finite and positive");
@@ -28,7 +28,7 @@ class CoulombField final : public GeometricAlgorithm<N> {
     const Vec<N> d = p - q;
     const double distance = d.norm(), reach = F_ / K;
     // Written as "not greater", so that a distance whose square underflows sticks.
-    if (!(distance > reach)) return q;  // (3), first case: bit for bit
+    if (!(distance > reach)) return q;  // (3), first case: q itself, bit for bit
     return p - (reach / distance) * d;  // (3), second case
   }
   [[nodiscard]] bool wants_time() const noexcept override { return false; }

@@ -1,11 +1,11 @@
 // One step in a Coulomb medium of force F, over any 𝒢' that renders the rest of the world.
 //
-// The medium adds −F (r − q)/‖r − q‖ (16) to ℳ. While the proxy moves, that is a viscous medium with the unknown λ =
-// F/‖r − q‖ in the place of b/T (media.hpp). With τ = λ/(κ + λ), 0 ≤ τ < 1, the step and the condition for τ are
+// The medium adds −F (r − q)/‖r − q‖ (16) to ℳ. For a moving proxy this equals a viscous medium with the unknown
+// λ = F/‖r − q‖ in place of b/T (media.hpp). With τ = λ/(κ + λ), 0 ≤ τ < 1, the step and the condition for τ are
 //   r(τ) = 𝒢'(κ/(1 − τ), p + τ (q − p), q),   κ τ/(1 − τ) ‖r(τ) − q‖ = F.
-// The condition's left side is linear in τ where 𝒢' is free or slides on a plane, and (3) is the solution there. The
-// proxy sticks if κ ‖R‖ ≤ F, R = lim (r(τ) − q)/(1 − τ) for τ → 1, which is extrapolated. Otherwise the condition is
-// solved by the secant method for short slips and by false position (the Illinois variant) for others.
+// If 𝒢' is free or slides on a plane, the condition's left side is linear in τ, and (3) is its solution. The proxy
+// sticks if κ ‖R‖ ≤ F, where R = lim (r(τ) − q)/(1 − τ) for τ → 1 is extrapolated. Otherwise the condition is solved by
+// the secant method for short slips and by false position (the Illinois variant) for others.
 #pragma once
 
 #include <algorithm>
@@ -24,8 +24,8 @@ class CoulombStep {
   CoulombStep(GeometricAlgorithm<N>& rest, double kappa, double force_N, const Vec<N>& p, const Vec<N>& q) noexcept
       : rest_(rest), kappa_(kappa), F_(force_N), p_(p), q_(q), d_(q - p), size_(d_.norm()) {}
 
-  // Returns r; its contacts are then rest.contacts(). `found` becomes false if no τ gives F. The medium then takes more
-  // or less than F in that step: r is the sample whose force is nearest to F.
+  // Returns r; rest.contacts() are then its contacts. `found` becomes false if no τ gives F. The medium then takes more
+  // or less than F, and r is the sample at which the search for τ ended.
   Vec<N> solve(bool& found) noexcept {
     found = true;
     if (Vec<N> free; goes_free(0, 0, free)) return free;
@@ -43,9 +43,8 @@ class CoulombStep {
         Vec<N> r;
         if (slip(F_ / pull, pull, r)) return r;
       }
-      // The proxy can't rest at q, because q is behind a surface (as the reference of order 2 may be), or an object
-      // carries the proxy away. Then r(τ) doesn't end in q, and the medium's force grows without bound, so a bracket
-      // exists.
+      // The proxy can't rest at q: q is behind a surface (possible at order 2), or an object carries the proxy away.
+      // Then r(τ) doesn't end in q, and the medium's force grows without bound, so a bracket exists.
       while (high.excess < 0.0 && 1.0 - high.tau > 1e-15) {
         low = high;
         high = at(1.0 - 0.1 * (1.0 - high.tau));
@@ -57,7 +56,7 @@ class CoulombStep {
 
  private:
   struct Sample {
-    double tau = 0.0, excess = 0.0;  // excess: the medium's force at τ less F, N
+    double tau = 0.0, excess = 0.0;  // excess: the medium's force at τ minus F, N
     Vec<N> r;
   };
 
@@ -68,16 +67,16 @@ class CoulombStep {
     return sample;
   }
 
-  // How far from F the rounding of r and of p + τ (q − p) may leave the medium's force, N.
+  // The error in the medium's force (N) that rounding of r and of p + τ (q − p) can cause.
   [[nodiscard]] double rounding_N(const Vec<N>& r) const noexcept {
     const double places = 16.0 * u * (r.template lpNorm<1>() + q_.template lpNorm<1>());
     return F_ * places / (r - q_).norm() + kappa_ * (places + 16.0 * u * p_.template lpNorm<1>());
   }
 
   // (3), second case: the proxy ends without contact. Tries the exact end (attempt 0) and ends some units in the last
-  // place beside it (`first` to `last`): past the middle of a ball, 𝒢' may find one free and its neighbour blocked.
+  // place beside it: past the middle of a ball, 𝒢' may find one point free and its neighbour blocked.
   bool goes_free(int first, int last, Vec<N>& r) noexcept {
-    const double share = (kappa_ * size_ - F_) / (kappa_ * size_);  // of the way to p; NaN where p = q
+    const double share = (kappa_ * size_ - F_) / (kappa_ * size_);  // fraction of the way from q to p; NaN for p = q
     if (!(share > 0.0)) return false;
     for (int k = first; k <= last; ++k) {
       const int units = k % 2 == 0 ? -2 * k : 2 * (k + 1);
@@ -89,19 +88,18 @@ class CoulombStep {
     return false;
   }
 
-  // Whether the rest of the world leaves a proxy at q, within the rounding of q. The stiffness is so large that no
-  // elastic layer moves the proxy.
+  // Whether the rest of the world leaves a proxy at q, within the rounding of q. The huge stiffness keeps elastic
+  // layers from moving the proxy.
   bool q_is_place() noexcept {
     return (rest_(1e15 * kappa_, q_, q_) - q_).norm() <= 32.0 * u * q_.template lpNorm<1>();
   }
 
-  // Near rest (τ → 1) the slip is short and the world is flat: r(τ) = q + (1 − τ) R. R is extrapolated to 1 − τ = 0
-  // by Neville's scheme (Richardson extrapolation), through samples whose 1 − τ is a quarter of the one before, until
-  // it changes by no more than the rounding of r. `high` becomes the last sample. Returns true if the world is flat
-  // from the first sample on.
+  // Near rest (τ → 1) the slip is short and the world is flat: r(τ) = q + (1 − τ) R. Extrapolates R to 1 − τ = 0 by
+  // Neville's scheme, quartering 1 − τ with each sample until R changes by no more than the rounding of r. `high`
+  // becomes the last sample. Returns true if the world is flat from the first sample on.
   bool extrapolate(Vec<N>& R, Sample& high) noexcept {
     constexpr int most = 14;
-    std::array<Vec<N>, most> row;  // by degree: the polynomials through the last samples, at 1 − τ = 0
+    std::array<Vec<N>, most> row;  // by degree: polynomials through the last samples, at 1 − τ = 0
     row[0] = R;
     Sample sample = high;
     double least = std::numeric_limits<double>::infinity();
@@ -122,7 +120,7 @@ class CoulombStep {
       const double change = (row[k] - last).norm();
       if (change > least && least <= 100.0 * rounding) break;
       least = change;
-      // If the last two agree so closely, the one before is as good and has a quarter of this one's rounding.
+      // If the last two agree within rounding, the one before is as good and has a quarter of the rounding error.
       R = change <= 0.5 * rounding ? last : row[k];
       high = sample;
       if (change <= rounding) break;
@@ -130,8 +128,8 @@ class CoulombStep {
     return false;
   }
 
-  // Tries a slip so short that r(τ) ≈ q + (1 − τ) R, by the secant method from the τ at which this form gives F.
-  // Returns false if it doesn't converge.
+  // Tries a slip so short that r(τ) ≈ q + (1 − τ) R: the secant method, from the τ at which this form gives F. Returns
+  // false if it doesn't converge.
   bool slip(double tau, double pull, Vec<N>& r) noexcept {
     Sample sample = at(tau);
     double slope = pull;
@@ -147,14 +145,15 @@ class CoulombStep {
     return std::abs(sample.excess) <= rounding_N(sample.r);
   }
 
-  // Evaluates 𝒢' once more so that rest.contacts() are those at q: as near to q as contacts can be told from rounding,
-  // or where the first sample was if none is found there.
+  // Evaluates 𝒢' once more so that rest.contacts() are the contacts at q: as near to q as rounding allows or, without
+  // contacts there, at the first sample's τ.
   void touch_at_rest() noexcept {
     at(1.0 - std::min(1e6 * u * (p_.template lpNorm<1>() + q_.template lpNorm<1>()) / size_, 1.0 - held_at));
     if (rest_.contacts().empty()) at(held_at);
   }
 
-  // False position (the Illinois variant) with a bisection every eighth step. Precondition: F lies between the two.
+  // False position (the Illinois variant) with a bisection every eighth step. Precondition: low.excess < 0 <
+  // high.excess.
   bool search(Sample low, Sample high) noexcept {
     double e_low = low.excess, e_high = high.excess;
     double tau = F_ / (kappa_ * size_);
@@ -173,8 +172,8 @@ class CoulombStep {
     return std::abs(last_.excess) <= rounding_N(last_.r);
   }
 
-  // If 𝒢' has several solutions (a push straight through a ball's middle, two faces of a box), r(τ) jumps from one to
-  // another, and F may lie within the jump. Each solution by itself is smooth in τ and is identified by its contacts.
+  // If 𝒢' has several solutions (a push straight through a ball's middle, two faces of a box), r(τ) jumps between them,
+  // and F may lie within a jump. Each solution by itself is smooth in τ; its contacts identify it.
   struct Answer {
     std::uint64_t touches = 0;
     Sample low{.tau = -1.0, .excess = 0.0, .r = {}}, high{.tau = 2.0, .excess = 0.0, .r = {}};
@@ -218,8 +217,8 @@ class CoulombStep {
     return false;
   }
 
-  // The secant method while samples stay with this solution; else points spread evenly over the bracket by the golden
-  // ratio.
+  // Uses the secant method while samples stay with this solution, otherwise points that the golden ratio spreads evenly
+  // over the bracket.
   bool search_within(Answer& answer) noexcept {
     constexpr double golden = 0.6180339887498949;
     bool same = true;
@@ -236,8 +235,7 @@ class CoulombStep {
     return false;
   }
 
-  // τ of the first sample near rest: 4 % of the way to p, which is near enough for most worlds to be flat and far above
-  // rounding.
+  // τ of the first sample near rest, 4 % of the way to p: near enough for most worlds to be flat, far above rounding.
   static constexpr double held_at = 0.96;
   static constexpr double close_enough = 1e-14;
   static constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();

@@ -1,8 +1,7 @@
-// A flat surface through any point of space, in rounded numbers.
+// A flat surface through any point of space, and the rounding errors of its heights.
 //
-// The paper's surface includes the origin and its normal has length one. Here the surface includes `point`, and heights
-// are taken relative to it, so that a surface a kilometre away loses only what its coordinates can't hold. The normal
-// is scaled to length one within rounding; it points to the free side.
+// The paper's surface contains the origin. Here heights are relative to `point`, so that a surface a kilometre away
+// loses only what its coordinates can't hold. The normal has length one within rounding and points to the free side.
 #pragma once
 
 #include <cmath>
@@ -25,14 +24,14 @@ Vec<N> unit(const Vec<N>& v) {
 template <int N>
 class FlatSurface {
  public:
-  // point in metres, normal of any length but zero.
+  // point in metres; normal of any length but zero. Throws std::invalid_argument for other values.
   FlatSurface(const Vec<N>& point_m, const Vec<N>& normal)
       : point_(point_m), normal_(unit<N>(normal)), point_size_(point_m.template lpNorm<1>()) {
     if (!point_m.allFinite()) throw std::invalid_argument("a surface needs a finite point");
   }
 
-  // The same from a normal that has length one already, for tangent planes within a step. Precondition: both arguments
-  // are finite, the normal's length is one within rounding.
+  // A surface from a normal of length one, for tangent planes within a step. Precondition: both arguments are finite,
+  // and the normal's length is one within rounding.
   static FlatSurface of_unit(const Vec<N>& point_m, const Vec<N>& unit_normal) noexcept {
     FlatSurface surface;
     surface.point_ = point_m;
@@ -44,24 +43,24 @@ class FlatSurface {
   [[nodiscard]] const Vec<N>& point() const noexcept { return point_; }
   [[nodiscard]] const Vec<N>& normal() const noexcept { return normal_; }
 
-  // nᵀ(x − point) in metres: positive on the free side, nᵀx of the paper where the point is the origin.
+  // nᵀ(x − point) in metres, positive on the free side: the paper's nᵀx if point is the origin.
   [[nodiscard]] double height(const Vec<N>& x) const noexcept { return normal_.dot(x - point_); }
 
-  // x − n nᵀ(x − point): the orthogonal projection onto the surface.
+  // The orthogonal projection onto the surface, x − n nᵀ(x − point).
   [[nodiscard]] Vec<N> projection(const Vec<N>& x) const noexcept { return x - normal_ * height(x); }
 
-  // The height below which rounding can't tell a point from one on the surface, in metres.
+  // The height (m) below which rounding can't tell a point from one on the surface.
   //
-  // Coordinates are rounded by u = 2⁻⁵³ of their size. For a point that was meant to be on the surface, the error of
-  // the computed height is at most u ‖x‖ (the coordinates themselves) + u ‖x − point‖ (the difference) + (N + 1) u ‖x −
-  // point‖ (the sum), so for N ≤ 3 at most 6 u (‖x‖₁ + ‖point‖₁). One unit more pays for the second-order terms and for
-  // ‖n‖ = 1 + O(u). More than twice that is taken, 16 u: about 2e-15 m within a metre of the origin.
+  // With u = 2⁻⁵³, the computed height of a point meant to be on the surface has an error of at most u ‖x‖
+  // (coordinates) + u ‖x − point‖ (difference) + (N + 1) u ‖x − point‖ (sum), for N ≤ 3 at most 6 u (‖x‖₁ + ‖point‖₁).
+  // One more unit covers second-order terms and ‖n‖ = 1 + O(u). The function returns more than twice that, 16 u: about
+  // 2e-15 m within a metre of the origin.
   [[nodiscard]] double rounding(const Vec<N>& x) const noexcept {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
     return 16.0 * u * (x.template lpNorm<1>() + point_size_);
   }
 
-  // ‖point‖₁: how far from the origin its coordinates are.
+  // ‖point‖₁: the size of the point's coordinates.
   [[nodiscard]] double size() const noexcept { return point_size_; }
 
   [[nodiscard]] bool holds(const Vec<N>& x) const noexcept { return std::abs(height(x)) <= rounding(x); }
@@ -71,7 +70,7 @@ class FlatSurface {
 
   Vec<N> point_;
   Vec<N> normal_;
-  double point_size_;  // ‖point‖₁
+  double point_size_;
 };
 
 }  // namespace proxarm::models

@@ -1,4 +1,4 @@
-// The world without anything in it: the proxy goes where it is asked to go.
+// An empty world: the proxy goes where it is asked to go.
 //
 //   𝒢(K, p, q) = p,   ℳ(q, q̇) = o
 #pragma once

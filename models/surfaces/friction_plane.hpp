@@ -6,9 +6,9 @@
 //
 //   p_sf = p − n nᵀp,   q_sf = q − n nᵀq
 //
-// with p and q taken relative to a point of the surface. ℳ is (17). K does not appear, because the penetration and the
-// reach of friction are both forces over K. A proxy that is on the surface (within rounding) and sticks is returned bit
-// for bit, so that it doesn't creep however long it is held.
+// p and q are relative to a point of the surface. ℳ is (17). K does not appear, because penetration and friction's
+// reach are both forces over K. A proxy that is on the surface (within rounding) and sticks is returned bit for bit, so
+// that it never creeps.
 #pragma once
 
 #include <cmath>
@@ -22,7 +22,7 @@ namespace proxarm::models {
 // One step on one surface.
 template <int N>
 struct FaceStep {
-  Vec<N> r;  // p itself if nothing touches
+  Vec<N> r;  // p itself without contact
   bool touches = false;
   bool slips = false;
 };
@@ -40,13 +40,13 @@ FaceStep<N> step_on_face(const FlatSurface<N>& surface, double mu, const Vec<N>&
   const Vec<N> q_sf = on_surface ? q : Vec<N>(q - n * n_q);
   const Vec<N> d = p_sf - q_sf;
   const double distance2 = d.squaredNorm(), reach = -mu * n_p;
-  // Written as "not greater", so that a distance whose square underflows sticks, and nothing is divided by zero below.
+  // Written as "not greater", so that a distance whose square underflows sticks, and no step divides by zero.
   if (!(distance2 > reach * reach))
     return {on_surface ? q : surface.projection(q_sf), true, false};  // (4), second case
 
   const Vec<N> r = p_sf - (reach / std::sqrt(distance2)) * d;  // (4), third case
-  // Where p is deeper than the scene is wide, the rounding of n_p leaves r off the surface, so r is projected once
-  // more.
+  // If p is deeper than the scene is wide, the rounding of n_p leaves r off the surface; a second projection corrects
+  // that.
   if (-n_p > 1e-3 + surface.size() + q.template lpNorm<1>()) return {surface.projection(r), true, mu > 0.0};
   return {r, true, mu > 0.0};
 }
@@ -55,7 +55,7 @@ template <int N>
 class FrictionPlane final : public GeometricAlgorithm<N> {
  public:
   // Throws std::invalid_argument for a normal without a direction or a friction coefficient that isn't finite and ≥ 0.
-  // μ = 0 gives (2), at the price of (4): Plane is cheaper.
+  // μ = 0 gives (2); Plane is cheaper then.
   FrictionPlane(const Vec<N>& point_m, const Vec<N>& normal, double friction)
       : surface_(point_m, normal), mu_(friction) {
     if (!std::isfinite(friction) || !(friction >= 0.0)) {

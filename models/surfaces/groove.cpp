@@ -18,7 +18,7 @@ struct CrossSection {
     double g;     // the balance of forces along e: zero at the solution
   };
 
-  // f and g at s, with friction only of the contacts in `mask` (bit i). A contact at rest (v_i = 0) has no friction
+  // f and g at s, with friction only at the contacts in `mask` (bit i). A contact at rest (v_i = 0) has no friction
   // here.
   Shares at(double s, int mask = 3) const noexcept {
     double A[2][2] = {{1.0, 0.0}, {cos, sin}};
@@ -39,7 +39,7 @@ struct CrossSection {
     return out;
   }
 
-  // The root for w = 0, by the closed form: the first guess.
+  // The first guess: the root for w = 0, in closed form.
   [[nodiscard]] double guess() const noexcept {
     const double f_2 = F_t / sin, f_1 = F_n - cos * f_2;
     return s_p - std::copysign(mu[0] * f_1 + mu[1] * f_2, s_p - s_q[0]);
@@ -47,9 +47,9 @@ struct CrossSection {
 
   // Whether g vanishes at s within rounding. A sign change may also be a pole of g; beside a pole g is large.
   //
-  // Where s passes s_i the friction of contact i turns round within some w_i, so g's slope is up to μ_i f_i/|w_i| there
-  // (5e3 for a q that was 0.3 nm beside the line and is pressed 6 µm deep): g vanishes no better than that times the
-  // rounding of s. Shares are taken as no greater than the force without friction, lest a pole's pass for a root's.
+  // Friction of contact i reverses within about w_i of s_i. So g's slope is up to μ_i f_i/|w_i| there (5e3 for a q 0.3
+  // nm beside the line, pressed 6 µm deep), and g vanishes only to this slope times the rounding of s. Shares are
+  // capped at the force without friction, so that a pole doesn't pass for a root.
   [[nodiscard]] bool is_root(double s, const Shares& shares) const noexcept {
     constexpr double eps = std::numeric_limits<double>::epsilon();
     const double force = std::abs(F_n) + std::abs(F_t), s_size = std::abs(s) + std::abs(s_p) + std::abs(s_q[0]);
@@ -61,9 +61,9 @@ struct CrossSection {
   }
 };
 
-// The root of g between lo and hi. Precondition: g(lo) ≤ 0 ≤ g(hi). Usually q is in the line, up to the surfaces'
-// curvature, and g is nearly linear around the closed form's solution: the secant method then takes a few steps. Where
-// it fails, false position (the Illinois variant) follows, with a bisection every fourth step.
+// The root of g between lo and hi. Precondition: g(lo) ≤ 0 ≤ g(hi). Usually g is nearly linear around the closed form's
+// solution, and the secant method takes a few steps. If it fails, false position (the Illinois variant) follows, with a
+// bisection every fourth step.
 double root(const CrossSection& c, double lo, double hi) noexcept {
   const double small = 2.0 * std::numeric_limits<double>::epsilon() * (std::abs(c.s_p) + std::abs(c.s_q[0]));
   double at = std::clamp(c.guess(), lo, hi), g_at = c.at(at).g, next = std::clamp(at - g_at, lo, hi);
@@ -87,7 +87,7 @@ double root(const CrossSection& c, double lo, double hi) noexcept {
   for (int k = 0; k < 200; ++k) {
     double s = (k % 4 == 3) ? 0.5 * (lo + hi) : (lo * g_hi - hi * g_lo) / (g_hi - g_lo);
     if (!(s > lo && s < hi)) s = 0.5 * (lo + hi);
-    if (!(s > lo && s < hi)) return s;  // neighbours among doubles
+    if (!(s > lo && s < hi)) return s;  // lo and hi are neighbouring doubles
     const double g = c.at(s).g;
     if (g == 0.0) return s;
     if (g < 0.0) {
@@ -120,7 +120,7 @@ class Groove {
     s_q_ = {line.e.dot(d_1), line.e.dot(d_2)};
     w_ = {-line.t1.dot(d_1), -line.t2.dot(d_2)};
     for (double& w : w_) w = std::abs(w) <= w_rounding_ ? 0.0 : w;
-    // The normal forces (over K) may miss zero by the rounding of p: such a contact touches.
+    // The rounding of p may make a normal force (over K) slightly negative; such a contact still touches.
     least_ = may_pull() ? -std::numeric_limits<double>::infinity() : -w_rounding_;
     f_2_ = F_t_ / line.sin;
     f_1_ = F_n_ - line.cos * f_2_;
@@ -151,7 +151,7 @@ class Groove {
     out_.found = true;
     const double reach = a_.mu * std::max(0.0, f_1_) + b_.mu * std::max(0.0, f_2_), d = s_p_ - s_q_[0];
     if (std::abs(d) <= reach) {
-      out_.r = a_.surface.holds(a_.q) && b_.surface.holds(a_.q) ? a_.q : place(s_q_[0]);  // sticks: bit for bit
+      out_.r = a_.surface.holds(a_.q) && b_.surface.holds(a_.q) ? a_.q : place(s_q_[0]);  // sticks: q itself
       return;
     }
     out_.slips1 = a_.mu > 0.0;
@@ -159,7 +159,7 @@ class Groove {
     out_.r = place(s_p_ - std::copysign(reach, d));
   }
 
-  // The proxy arrives in the line: the root of g.
+  // The proxy arrives in the line from beside it: the root of g.
   void from_beside() noexcept {
     const CrossSection c{line_.cos, line_.sin, F_n_, F_t_, s_p_, {a_.mu, b_.mu}, {s_q_[0], s_q_[1]}, {w_[0], w_[1]}};
     double lo = std::min({s_p_, s_q_[0], s_q_[1]}), hi = std::max({s_p_, s_q_[0], s_q_[1]});
@@ -173,8 +173,8 @@ class Groove {
   }
 
   // A contact with w = 0 need not slip across the line, so it may stick while the other slips. Returns true if one
-  // sticks: the solution is then accepted, or there is none because a contact pulls. Otherwise lo and hi are narrowed
-  // to the side to which that contact is pushed, where the root is.
+  // sticks: the solution is then accepted, or none exists because a contact pulls. Otherwise narrows lo and hi to the
+  // side of the root, to which that contact is pushed.
   bool one_sticks(const CrossSection& c, double& lo, double& hi) noexcept {
     for (int i = 0; i < 2; ++i) {
       if (c.w[i] != 0.0 || !(c.mu[i] > 0.0) || c.s_q[i] < lo || c.s_q[i] > hi) continue;
@@ -193,10 +193,10 @@ class Groove {
     return false;
   }
 
-  // Where p is far deeper than q was away, friction across the line can make the 2 × 2 system singular: g then has
-  // several roots, or poles between them. Roots are looked for from s_p towards s_1, in intervals that end 0.7 times as
-  // far from s_1 as they begin. If the first root was refused because a contact pulls, the search begins 1000 w from
-  // s_1: farther away all slips are practically along e, and g has no further root.
+  // If p is far deeper than q was away, friction across the line can make the 2 × 2 system singular: g then has several
+  // roots, or poles between them. Searches from s_p towards s_1, in intervals that end 0.7 times as far from s_1 as
+  // they begin. After a first root at which a contact pulls, the search begins 1000 w from s_1: farther away all slips
+  // are practically along e, and g has no further root.
   void look_for_another_root(const CrossSection& c, bool first_was_root) noexcept {
     const double widest = std::max(std::abs(c.w[0]), std::abs(c.w[1])), way = std::abs(s_p_ - s_q_[0]);
     double at = first_was_root ? std::min(1.0, 1e3 * widest / way) : 1.0;
@@ -222,10 +222,10 @@ class Groove {
   const PlaneContact &a_, &b_;
   const GrooveLine& line_;
   GrooveSearch search_;
-  double rounding_, w_rounding_;   // w_rounding: what w may be for a proxy that is in the line
+  double rounding_, w_rounding_;   // w_rounding: largest |w| of a proxy that is in the line
   double s_p_, F_n_, F_t_;         // p along e, and x₀ − p across it
-  std::array<double, 2> s_q_, w_;  // q of each contact along e and across it; w = 0 exactly within rounding
-  double least_, f_1_, f_2_;       // least normal force; those without friction
+  std::array<double, 2> s_q_, w_;  // q of each contact along e and across it; |w| within rounding is set to 0
+  double least_, f_1_, f_2_;       // least normal force allowed; normal forces without friction
   GrooveSolution out_;
 };
 

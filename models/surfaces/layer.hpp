@@ -1,9 +1,9 @@
-// An elastic layer on a surface, which yields by force over stiffness k, down to its rigid core.
+// An elastic layer on a surface: it yields by force over stiffness k, down to its rigid core.
 //
-//   K (h − h_p) = −k h        along the normal; h and h_p are the heights of r and p, and −h ≤ the layer's thickness
+//   K (h − h_p) = −k h        along the normal; h and h_p are the heights of r and p; −h ≤ the layer's thickness
 //   (4) along the tangent     with the normal force K (h − h_p)
 //
-// The force that the layer returns at r is the same for every K, so Assumption 1 holds.
+// The layer's force at r is the same for every K, so Assumption 1 holds.
 #pragma once
 
 #include <algorithm>
@@ -13,9 +13,8 @@
 
 namespace proxarm::models {
 
-// The surface yields along its normal by f_n / stiffness until the rigid core is reached.
 struct Layer {
-  double stiffness_N_per_m = std::numeric_limits<double>::infinity();  // infinite: there is no layer
+  double stiffness_N_per_m = std::numeric_limits<double>::infinity();  // infinite: no layer
   double thickness_m = 0.0;
 
   [[nodiscard]] bool soft() const noexcept { return thickness_m > 0.0; }

@@ -1,6 +1,6 @@
-// Renders a world of one or two dimensions with a 𝒢 of three: the coordinates that the world doesn't have stay zero.
+// Renders a world of one or two dimensions with a 𝒢 of three: the missing coordinates stay zero.
 //
-// Precondition: all surface normals of that 𝒢 lie in the first N dimensions, so that no force leads out of them.
+// Precondition: all surface normals of that 𝒢 lie in the first N dimensions, so that all forces do.
 #pragma once
 
 #include <array>

@@ -1,11 +1,11 @@
-// What a 𝒢 means in forces: ℳ of (14), (16), (17) as set-membership tests, and the maps (9) and (12) between 𝒢 and ℳ as
-// numerical checks.
+// The forces that a 𝒢 stands for: ℳ of (14), (16), (17) as set-membership tests, and the maps (9) and (12) between 𝒢
+// and ℳ as numerical checks.
 //
 //   ℳ(q, v) = f  s.t.  q = 𝒢(κ, q − f/κ, q − T v)  ∀ κ > 0                (9)
 //   𝒢(κ, p, q) = r  s.t.  ℳ(r, (r − q)/T) = κ (r − p)                       (12)
 //
-// ℳ is set-valued, so it stands here as a test: how far is f from ℳ(q, v)? The cycle doesn't need it; `proxarm check`
-// and the tests do.
+// ℳ is set-valued, so it is written as a test: how far is f from ℳ(q, v)? `proxarm check` and the tests use it; the
+// cycle doesn't.
 #pragma once
 
 #include <algorithm>
@@ -18,9 +18,9 @@
 
 namespace proxarm::models {
 
-// How far a state (q, v, f) is from satisfying f ∈ ℳ(q, v). Zero for a member; a caller compares with its own rounding.
+// How far a state (q, v, f) is from f ∈ ℳ(q, v). Zero for a member; the caller chooses the tolerance.
 struct MembershipError {
-  double position_m = 0.0;  // how far q is on the wrong side of the surface
+  double position_m = 0.0;  // depth of q behind the surface
   double force_N = 0.0;     // distance of f from the set
 
   [[nodiscard]] bool within(double tolerance_m, double tolerance_N) const noexcept {
@@ -28,13 +28,13 @@ struct MembershipError {
   }
 };
 
-// The tolerances of the laws' questions whether q is on the surface, and whether it moves along it.
+// Tolerances for "q is on the surface" and "q moves along it".
 struct MembershipTolerance {
   double surface_m = 1e-12;     // height up to which q is on the surface
-  double motion_m_per_s = 0.0;  // ‖Nᵀv‖ up to which the proxy is at rest
+  double motion_m_per_s = 0.0;  // ‖Nᵀv‖ up to which the proxy counts as resting
 };
 
-// (14): o if nᵀq > 0;  {f n | f > 0} if nᵀq = 0. The set is closed here (f ≥ 0): a touch without force is a member.
+// (14): o if nᵀq > 0;  {f n | f > 0} if nᵀq = 0. Here the set is closed (f ≥ 0): touching without force is a member.
 template <int N>
 class WallLaw {
  public:
@@ -73,7 +73,7 @@ class CoulombLaw {
 // (17): o                                              if nᵀq > 0
 //       {f (n − μ N Nᵀv/‖Nᵀv‖) | f > 0}                if nᵀq = 0 ∧ Nᵀv ≠ o
 //       {f (n − μ t) | f > 0, tᵀn = 0, ‖t‖ ≤ 1}        if nᵀq = 0 ∧ Nᵀv = o
-// N Nᵀ = I − n nᵀ, so N itself is never needed. Closed like (14). For N = 1 there is no tangent and this is (14).
+// N Nᵀ = I − n nᵀ, so N itself is never needed. Closed like (14). For N = 1 there is no tangent, and this is (14).
 template <int N>
 class FrictionWallLaw {
  public:
@@ -86,8 +86,8 @@ class FrictionWallLaw {
     const Vec<N>& n = surface_.normal();
     const double f_n = n.dot(f);
     const Vec<N> f_t = f - f_n * n, v_t = v - n * n.dot(v);
-    // Distance from the cone, overestimated by a factor of at most √(1 + μ²): the excess of the tangential force. Where
-    // the force pulls, its whole length counts.
+    // Excess of the tangential force: the distance from the cone, overestimated by a factor of at most √(1 + μ²). A
+    // pulling force counts in full.
     const double at_rest = f_n < 0.0 ? f.norm() : std::max(0.0, f_t.norm() - mu_ * f_n);
     const double speed = v_t.norm();
     const double moving = speed > 0.0 ? slip_error(f_n, f_t, v_t / speed, f) : at_rest;
@@ -105,7 +105,7 @@ class FrictionWallLaw {
   MembershipTolerance zero_;
 };
 
-// Map (12), read as a test: r = 𝒢(κ, p, q) must satisfy κ (r − p) ∈ ℳ(r, (r − q)/T).
+// Map (12) as a test: r = 𝒢(κ, p, q) must satisfy κ (r − p) ∈ ℳ(r, (r − q)/T).
 template <int N, typename Law>
 MembershipError map_12_error(GeometricAlgorithm<N>& g, const Law& law, double kappa, const Vec<N>& p, const Vec<N>& q,
                              double period_s) {
@@ -113,8 +113,8 @@ MembershipError map_12_error(GeometricAlgorithm<N>& g, const Law& law, double ka
   return law(r, (r - q) / period_s, kappa * (r - p));
 }
 
-// Map (9), read as a test, which is Assumption 1 at the state (r, q, f): the greatest ‖𝒢(κ, r − f/κ, q) − r‖ in metres
-// over the given κ. Zero (within rounding) for every κ if f ∈ ℳ(r, (r − q)/T).
+// Map (9) as a test, which is Assumption 1 at the state (r, q, f): the greatest ‖𝒢(κ, r − f/κ, q) − r‖ over the given
+// κ, metres. Zero (within rounding) for every κ if f ∈ ℳ(r, (r − q)/T).
 template <int N>
 double map_9_error(GeometricAlgorithm<N>& g, const Vec<N>& r, const Vec<N>& q, const Vec<N>& f,
                    std::span<const double> kappas) {
@@ -127,9 +127,9 @@ double map_9_error(GeometricAlgorithm<N>& g, const Vec<N>& r, const Vec<N>& q, c
   return worst;
 }
 
-// What rounding alone may do to map (9), in metres, for a state that was found with stiffness K:
+// The error (m) in map (9) that rounding alone can cause, for a state found with stiffness K:
 //   64 ε [(‖r‖ + ‖q‖)(1 + K/κ) + ‖f‖/κ].
-// r carries an error of its coordinates' rounding, f = K (r − p) carries K times that, and f/κ is rounded again.
+// r carries the rounding of its coordinates, f = K (r − p) carries K times that error, and f/κ is rounded again.
 template <int N>
 double map_9_rounding(const Vec<N>& r, const Vec<N>& q, const Vec<N>& f, double K, double kappa) {
   constexpr double eps = std::numeric_limits<double>::epsilon();

@@ -3,8 +3,8 @@
 //   𝒢(K, p, q) = p              if nᵀp > 0
 //                p − n nᵀp      if nᵀp ≤ 0                        (2)
 //
-// with p and q taken relative to a point of the surface. ℳ is (14). The result lies on the surface within rounding
-// (FlatSurface::rounding) or is p itself, bit for bit.
+// p and q are relative to a point of the surface. ℳ is (14). The result is on the surface within rounding
+// (FlatSurface::rounding), or is p itself, bit for bit.
 #pragma once
 
 #include "models/geometry/geometric_algorithm.hpp"
@@ -24,8 +24,8 @@ class Plane final : public GeometricAlgorithm<N> {
     touches_ = !(surface_.height(p) > 0.0);
     if (!touches_) return p;  // (2), first case
     if constexpr (N == 1) return surface_.point();
-    // (2), second case. One projection alone would be off by u ‖p‖, which matters where κ is tiny and p far away; the
-    // second one removes that.
+    // (2), second case. One projection would leave an error of u ‖p‖, which matters for tiny κ and p far away; the
+    // second removes it.
     return surface_.projection(surface_.projection(p));
   }
   [[nodiscard]] bool wants_time() const noexcept override { return false; }

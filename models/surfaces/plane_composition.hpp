@@ -1,13 +1,13 @@
 // Several flat surfaces at once: corners, grooves, wedges, boxes seen from inside, with friction on each side.
 //
-// The free space in front of all of them is convex. A step's solution is a set of at most three contacts and the point
-// that they hold. Sets are tried until one is complete (contact_search.hpp): nothing pulls, nothing is penetrated, and
-// friction is as (17) says for each contact. Fewer contacts come first, then the smallest ‖r − p‖. Where Coulomb's law
-// has several solutions (grooves sharper than 2 atan μ can jam), this rule chooses one.
+// The free space in front of all faces is convex. A step's solution is a set of at most three contacts and the point
+// that they hold. The search (contact_search.hpp) tries sets until one is complete: no contact pulls, nothing is
+// penetrated, and each contact's friction obeys (17). Fewer contacts come first, then the smallest ‖r − p‖. If
+// Coulomb's law has several solutions (grooves sharper than 2 atan μ can jam), this rule chooses one.
 //   one contact     (4), exactly
 //   two             solve_groove
 //   three           the corner itself, if the three friction cones together can bear the force
-// Nothing here depends on K, and the result doesn't depend on earlier steps.
+// K doesn't appear, and the result doesn't depend on earlier steps.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ namespace proxarm::models {
 
 class PlaneComposition final : public GeometricAlgorithm<3> {
  public:
-  // Faces as objects 0, 1, … in this order. Throws std::invalid_argument for a μ that isn't finite and ≥ 0.
+  // Faces become objects 0, 1, … in this order. Throws std::invalid_argument for a μ that isn't finite and ≥ 0.
   explicit PlaneComposition(std::vector<Face> faces);
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
@@ -56,8 +56,8 @@ class PlaneComposition final : public GeometricAlgorithm<3> {
   bool search(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
 
   std::vector<Face> faces_;
-  std::vector<GrooveLine> lines_;     // of all pairs, at i · n + j; empty where there are many faces: made when needed
-  std::vector<CornerPoint> corners_;  // of all triples, at (i · n + j) · n + k; likewise
+  std::vector<GrooveLine> lines_;     // of all pairs, at i · n + j; empty if there are too many faces to store them
+  std::vector<CornerPoint> corners_;  // of all triples, at (i · n + j) · n + k; empty if there are too many faces
   std::array<Contact<3>, 3> contacts_{};
   std::size_t count_ = 0;
   std::uint64_t without_friction_ = 0;

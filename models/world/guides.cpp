@@ -11,12 +11,12 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
-// The longest push, as a multiple of the object's motion at q. The push along the guide is that motion over the sine of
-// the angle between surface and guide, so ten allows angles down to about 6°; an object that leans less comes across
-// the guide and would throw the proxy far along it.
+// The longest push, as a multiple of the object's motion at q. The push is that motion over the sine of the angle
+// between surface and guide, so ten allows angles down to about 6°; below, the object would throw the proxy far along
+// the guide.
 constexpr double longest_push = 10.0;
 
-// Whether a proxy that the object has carried to `carried` may end at x, outside of the object.
+// Whether a proxy that the object has carried to `carried` may end at x, outside the object.
 bool is_clear(const Obstacle& object, const Vec3& carried, const Vec3& x) noexcept {
   return !object.excludes(carried, x) && object.distance(x) >= 0.0;
 }
@@ -64,7 +64,7 @@ PolylineGuide PolylineGuide::line(const Vec3& point_m, const Vec3& direction, do
   return guide;
 }
 
-// The nearest piece; the first one if several are equally near (at a corner).
+// The nearest piece; the first of several equally near ones (at a corner).
 std::size_t PolylineGuide::nearest_piece(const Vec3& q) const noexcept {
   std::size_t best = 0;
   double least = infinity;
@@ -90,8 +90,8 @@ Vec3 PolylineGuide::report(const Vec3& r, const Vec3& p, std::size_t piece, bool
   return r;
 }
 
-// Whether the straight way between two points is free. If not, `to` becomes the point where an object stops it, or
-// `from` itself if that point is nearer to `from` than rounding can tell.
+// Whether the straight way between two points is free. If not, `to` becomes the point where an object stops the proxy,
+// or `from` if rounding can't tell the two apart.
 bool PolylineGuide::leads(const Vec3& from, Vec3& to, bool past_pushing) noexcept {
   if (from == to) return true;
   bool free = true;
@@ -109,7 +109,7 @@ bool PolylineGuide::leads(const Vec3& from, Vec3& to, bool past_pushing) noexcep
     if ((past_pushing && pushes_[i] != 0) || !mover.obstacle->bars(from, end)) continue;
     free = false;
     end = models::sweep(*mover.obstacle, from, end);
-    // The contact is that of a step which leads a nanometre into the object.
+    // Takes the contact from a step that leads a nanometre into the object.
     const Vec3 back = (from - to).normalized();
     const Obstacle::Step s = mover.obstacle->step(1.0, end - 1e-9 * back, end);
     contacts_[1] = {mover.object, mover.feature < 0 ? s.feature : mover.feature, false, s.touches ? s.normal : back};
@@ -125,14 +125,14 @@ void PolylineGuide::set_time(const StepTime& time) noexcept {
   for (const World::Entry& mover : *movers_) mover.obstacle->set_time(time.time_s, time.period_s);
 }
 
-// Steps to the neighbouring piece; false at an end of the guide.
+// Changes `piece` to its neighbour; false at an end of the guide.
 bool PolylineGuide::next_piece(std::size_t& piece, bool forward) const noexcept {
   if (!closed_ && (forward ? piece + 1 == pieces_.size() : piece == 0)) return false;
   piece = forward ? (piece + 1) % pieces_.size() : (piece + pieces_.size() - 1) % pieces_.size();
   return true;
 }
 
-// Moves a place by a length along the guide, to the guide's end at most.
+// Moves a place by a length (m) along the guide, at most to the guide's end.
 PolylineGuide::Place PolylineGuide::advance(Place at, double by) const noexcept {
   const bool forward = by > 0.0;
   for (std::size_t visited = 0; visited <= pieces_.size(); ++visited) {
@@ -153,8 +153,8 @@ PolylineGuide::Place PolylineGuide::advance(Place at, double by) const noexcept 
   return at;
 }
 
-// Moves a place that the object has come over to the next one on that side that is free of it: by doubling steps until
-// one is free, then by bisection. False if there is none within `most`.
+// Moves a place that the object covers to the next free place on one side: doubles the step until the place is free,
+// then bisects. False if there is no free place within `most` (m).
 bool PolylineGuide::clear_of(const Obstacle& object, const Vec3& carried, int side, double most,
                              Place& place) const noexcept {
   if (!(most > 0.0)) return false;
@@ -182,7 +182,7 @@ bool PolylineGuide::clear_of(const Obstacle& object, const Vec3& carried, int si
   return true;
 }
 
-// The side along the piece to which an object that has come over q pushes; 0: neither, it pushes across.
+// The direction along the piece in which an object that covers q pushes; 0: it pushes across the piece.
 int PolylineGuide::pushed_to(const Obstacle& object, const Vec3& carried, const Vec3& q, std::size_t piece,
                              Contact<3>& contact) const noexcept {
   const Obstacle::Step s = object.step(1.0, q, q);
@@ -193,7 +193,7 @@ int PolylineGuide::pushed_to(const Obstacle& object, const Vec3& carried, const 
   return lean > 0.0 ? 1 : lean < 0.0 ? -1 : 0;
 }
 
-// Whether the way along the guide between two places is free of all objects but those that push.
+// Whether the way along the guide between two places is free of all objects except those that push.
 bool PolylineGuide::reaches(Place from, const Place& to, int side) noexcept {
   for (std::size_t visited = 0; visited <= pieces_.size() && from.piece != to.piece; ++visited) {
     const Piece& piece = pieces_[from.piece];
@@ -206,8 +206,8 @@ bool PolylineGuide::reaches(Place from, const Place& to, int side) noexcept {
   return leads(from.x, end, true);
 }
 
-// Moves the place of q along with the objects that have come over it. False if there is no room: the proxy is squeezed,
-// and the place stays as it was.
+// Moves the place of q along with the objects that cover it. False if there is no room: the proxy is squeezed, and the
+// place doesn't change.
 bool PolylineGuide::carry(const Vec3& q, Place& place) noexcept {
   if (!movers_) return true;
   const Place begin = place;
@@ -249,7 +249,7 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
   const Piece& nearest = pieces_[place.piece];
   place.s = std::clamp(nearest.e.dot(q - nearest.a), nearest.begin, nearest.length);
   const Vec3 foot = nearest.a + place.s * nearest.e;
-  // A proxy on the guide within rounding (as FlatSurface::rounding) sticks bit for bit.
+  // A proxy on the guide within rounding (as in FlatSurface::rounding) sticks bit for bit.
   if (!((q - foot).lpNorm<1>() <= 16.0 * u * (q.lpNorm<1>() + nearest.a.lpNorm<1>() + std::abs(place.s)))) {
     place.x = foot;
   }
@@ -269,7 +269,7 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
   return r;
 }
 
-// Where (4) takes a proxy along a piece.
+// The place to which (4) takes a proxy along a piece.
 PolylineGuide::Lead PolylineGuide::lead(const Piece& piece, const Vec3& p, double from) const noexcept {
   const Vec3 d = p - piece.a;
   const double s_p = piece.e.dot(d), reach = mu_ * (d - s_p * piece.e).norm();
@@ -277,13 +277,13 @@ PolylineGuide::Lead PolylineGuide::lead(const Piece& piece, const Vec3& p, doubl
   return {s_p - std::copysign(reach, s_p - from), s_p > from ? 1 : -1};
 }
 
-// The step by (4) from a place on, around corners where the next piece leads on.
+// The step by (4) from a place on, around corners if the next piece leads on.
 Vec3 PolylineGuide::slide(const Vec3& p, const Place& place) noexcept {
   std::size_t i = place.piece;
   const double begin = pieces_[i].begin, length = pieces_[i].length;
   Lead way = lead(pieces_[i], p, place.s);
   if (way.side == 0) {
-    // This piece doesn't lead the proxy away. At a corner the neighbouring one may.
+    // This piece doesn't lead the proxy away. At a corner the neighbour may.
     const bool in_corner = pieces_.size() > 1 && (place.s == begin || place.s == length);
     if (!in_corner) return report(place.x, p, i, false);
     way = place.s == length ? Lead{infinity, 1} : Lead{-infinity, -1};
@@ -304,7 +304,7 @@ Vec3 PolylineGuide::slide(const Vec3& p, const Place& place) noexcept {
     std::size_t next = i;
     if (!next_piece(next, forward)) return report(corner, p, i, false);
     const Lead on = lead(pieces_[next], p, forward ? pieces_[next].begin : pieces_[next].length);
-    if (on.side != way.side) return report(corner, p, i, false);  // held in the corner
+    if (on.side != way.side) return report(corner, p, i, false);  // held at the corner
     i = next;
     way = on;
   }

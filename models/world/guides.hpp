@@ -1,19 +1,18 @@
-// Guides (virtual fixtures): the proxy is held on a line, a plane or a polyline, from both sides, with friction along
-// it.
+// Guides (virtual fixtures): a line, plane or polyline holds the proxy from both sides, with friction along it.
 //
-// On a line with direction e, in units where K = 1, the guide bears any force across e. Along e it bears friction:
+// In units where K = 1, a line with direction e bears any force across e, and along e it bears friction:
 //   r = q if |eᵀ(p − q)| ≤ μ ‖f_⟂‖,  else eᵀ(r − p) = ∓ μ ‖f_⟂‖,   f = r − p.
-// This is (4) with the distance from the line in the place of the penetration. A q beside the guide is first moved to
-// the nearest point of the guide.
+// This is (4) with the distance from the line as penetration. A q beside the guide first moves to the nearest point of
+// the guide.
 //
-// An object that has moved over q first pushes the proxy along a line or a polyline, to q': the next point of the guide
-// outside the object, in the direction d = ±e with nᵀd > 0, n the object's normal there. Then q' takes the place of q,
-// and (4) and the stops are those of objects at rest. The object thus exerts a force F ≥ 0 along d, zero unless they
-// touch: r = q' where dᵀ(p − q') ≤ μ ‖f_⟂‖. q' depends neither on p nor on K, so Assumption 1 holds. The proxy is
-// squeezed() if there is no q' within ten times the object's motion at q: the object moves nearly across the guide, the
-// guide ends, or another object is in the way.
+// An object that has moved over q first pushes the proxy along a line or a polyline to q': the next point of the guide
+// outside the object, in the direction d = ±e with nᵀd > 0, n being the object's normal. Then q' replaces q, and (4)
+// and the stops work as with resting objects. So the object exerts a force F ≥ 0 along d, and F > 0 only in contact: r
+// = q' if dᵀ(p − q') ≤ μ ‖f_⟂‖. q' depends neither on p nor on K, so Assumption 1 holds. Without a q' within ten times
+// the object's motion at q, the proxy is squeezed(): the object moves nearly across the guide, the guide ends, or
+// another object is in the way.
 //
-// A plane among objects is two half-spaces back to back (scenes/compiler/compile.cpp): a World solves it with them.
+// Among objects, a plane guide is two half-spaces back to back (scenes/compiler/compile.cpp) in a World.
 #pragma once
 
 #include <array>
@@ -28,7 +27,7 @@
 
 namespace proxarm::models {
 
-// Both sides of a plane.
+// A plane that holds the proxy from both sides.
 class PlaneGuide final : public GeometricAlgorithm<3> {
  public:
   PlaneGuide(const Vec3& point_m, const Vec3& normal, double friction);
@@ -42,24 +41,24 @@ class PlaneGuide final : public GeometricAlgorithm<3> {
   Contact<3> contact_;
 };
 
-// A chain of straight pieces, open or closed; one piece with endless ends is a line. At a corner the proxy stays while
-// neither piece leads it away.
+// A chain of straight pieces, open or closed; a line is one piece with infinite ends. At a corner the proxy stays
+// unless one of the two pieces leads it away.
 class PolylineGuide final : public GeometricAlgorithm<3> {
  public:
-  // At least two points, neighbours apart from each other. Throws std::invalid_argument otherwise, and for a friction
-  // that isn't finite and ≥ 0.
+  // At least two points, and neighbours must differ. Throws std::invalid_argument otherwise, and for a friction that
+  // isn't finite and ≥ 0.
   PolylineGuide(const std::vector<Vec3>& points_m, bool closed, double friction);
-  // An endless line.
+  // An infinite line.
   static PolylineGuide line(const Vec3& point_m, const Vec3& direction, double friction);
 
-  // Objects that stand still stop the proxy on its way along the guide. Their friction and their slope don't matter:
-  // the guide leaves only one way to go, and together with the guide they can bear any force along it. `index` is the
-  // object number under which contacts report the guide.
+  // Lets resting objects stop the proxy on its way along the guide. Their friction and slope don't matter: together
+  // with the guide they can bear any force along it. Contacts report the guide as object number `index`.
   void stop_at(std::shared_ptr<World> objects, std::int32_t index) noexcept {
     objects_ = std::move(objects);
     contacts_[0].object = index;
   }
-  // Moving objects stop the proxy, too, and push it along. Precondition: they have no friction and aren't meshes.
+  // Lets moving objects stop the proxy and push it along the guide. Precondition: they have no friction and aren't
+  // meshes.
   void be_pushed_by(std::vector<World::Entry> movers) {
     movers_ = std::make_shared<std::vector<World::Entry>>(std::move(movers));
     pushes_.assign(movers_->size(), 0);
@@ -70,24 +69,24 @@ class PolylineGuide final : public GeometricAlgorithm<3> {
   [[nodiscard]] bool wants_time() const noexcept override { return movers_ != nullptr; }
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
   [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
-  // The contact with the guide, and the one with the object that stops the proxy, if there is one.
+  // The contact with the guide; after it, if an object stops the proxy, the contact with that object.
   [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
 
  private:
   struct Piece {
-    Vec3 a;         // its beginning
+    Vec3 a;         // where it begins
     Vec3 e;         // unit
     double length;  // infinite for a line
     double begin;   // 0, or minus infinity
   };
-  // A point of the guide.
+  // A point on the guide.
   struct Place {
     std::size_t piece = 0;
-    double s = 0.0;  // from the piece's beginning
+    double s = 0.0;  // from the piece's start, m
     Vec3 x = Vec3::Zero();
   };
   struct Lead {
-    double to = 0.0;  // from the piece's beginning; may be past its ends
+    double to = 0.0;  // from the piece's start, m; may be beyond its ends
     int side = 0;     // 1: forward, −1: backward, 0: the proxy sticks
   };
   PolylineGuide() = default;
@@ -109,9 +108,9 @@ class PolylineGuide final : public GeometricAlgorithm<3> {
   bool closed_ = false;
   double mu_ = 0.0;
   std::size_t last_ = 0;            // the piece on which the last step ended
-  std::shared_ptr<World> objects_;  // that stand still; null: none
+  std::shared_ptr<World> objects_;  // resting objects; null: none
   std::shared_ptr<std::vector<World::Entry>> movers_;
-  std::vector<char> pushes_;  // by mover: 1 if it pushes in this step
+  std::vector<char> pushes_;  // for each moving object: 1 if it pushes in this step
   std::uint64_t unresolved_ = 0;
   bool squeezed_ = false;
   std::array<Contact<3>, 2> contacts_;

@@ -13,12 +13,11 @@ namespace {
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 constexpr std::size_t most = SharedSupport::most;
 constexpr int most_rounds = 4;
-// Largest ‖p − q‖, and largest sum of forces over K, that is solved. Typical steps are micrometres. Forces settle to 64
-// u of this, which is 0.1 nm; beyond, rounding would be as large as thin layers are thick.
+// Limit for ‖p − q‖ and for the sum of forces over K. Typical steps are micrometres. Forces settle to 64 u of this, 0.1
+// nm; beyond, rounding would be as large as layers are thin.
 constexpr double farthest_m = 1e4;
 static_assert(3 * most <= most_equations);
 
-// One contact on its tangent plane.
 struct FlatContact {
   FlatSurface<3> surface = FlatSurface<3>::of_unit(Vec3::Zero(), Vec3::UnitZ());
   double mu = 0.0;
@@ -65,20 +64,19 @@ class FlatSupport {
   Vec3 r;
   int budget = 0;
 
-  // The residual at which forces count as settled: the rounding of r.
+  // The residual at which forces count as settled: the rounding of r, m.
   [[nodiscard]] double rounding_m() const noexcept { return 64.0 * u * size_; }
 
-  // The sum of the forces over K.
+  // The sum of the forces' sizes over K, m.
   [[nodiscard]] double squeeze_m() const noexcept {
     double sum = 0.0;
     for (std::size_t i = 0; i < count; ++i) sum += x[i].norm();
     return sum;
   }
 
-  // By Assumption 1 a contact's force is the same for every stiffness, so Newton's method may work with another one
-  // than K. K itself is tried first; then stiffnesses that keep the points p_i near their surfaces, where the equations
-  // are closer to linear. Forces found with another stiffness are exact only to its rounding: a few steps with K
-  // finish.
+  // By Assumption 1 a contact's force is the same for every stiffness, so Newton's method may use another one. It tries
+  // K first, then stiffnesses that keep the points p_i near their surfaces, where the equations are closer to linear; a
+  // few steps with K then remove the other stiffness's rounding.
   bool solve(double K, const Vec3& p) noexcept {
     const std::array<Vec3, most> start = x;
     double k = 0.0;
@@ -103,9 +101,8 @@ class FlatSupport {
   enum class Haste : std::uint8_t { few_steps, none };
   static constexpr int most_steps = 40, bold_steps = 8, most_stuck = 4;
 
-  // Newton's method. The first steps are taken in any case (`bold`), because the way to the right pieces of (4) may
-  // lead over larger residuals; later ones only if they reduce the residual; Gauss–Seidel sweeps take over where they
-  // don't.
+  // Newton's method. The first steps are always taken (`bold`): the way to the right pieces of (4) may lead over larger
+  // residuals. Later steps must reduce the residual; otherwise Gauss–Seidel sweeps take over.
   bool solve_from_here(double K, const Vec3& p, Haste haste) noexcept {
     double apart = evaluate(K, p);
     int stuck = 0;
@@ -117,7 +114,7 @@ class FlatSupport {
         stuck = 0;
         continue;
       }
-      // Either rounding is all that is left, or Newton's step doesn't reduce the residual.
+      // Either only rounding is left, or Newton's step doesn't reduce the residual.
       if (apart <= 64.0 * nothing) return true;
       if (++stuck > most_stuck) return false;
       for (int s = 0; s < 3 * stuck; ++s) sweep(K, p);
@@ -127,7 +124,7 @@ class FlatSupport {
   }
 
   // One nonlinear Gauss–Seidel sweep: each contact in turn, with the latest forces of the others. Rigid contacts come
-  // first, since the layers' forces are known already from where the proxy was.
+  // first, because the proxy's previous position already gives the layers' forces.
   void sweep(double K, const Vec3& p) noexcept {
     budget -= static_cast<int>(count * count);
     for (const bool soft : {false, true}) {
@@ -142,7 +139,8 @@ class FlatSupport {
     }
   }
 
-  // The residuals R_i = 𝒢_i(σK, r − x_i/σ) − r with r = p + Σ x_j and σ = stiffer_; returns the largest component.
+  // Computes the residuals R_i = 𝒢_i(σK, r − x_i/σ) − r with r = p + Σ x_j and σ = stiffer_. Returns their largest
+  // component.
   double evaluate(double K, const Vec3& p) noexcept {
     r = p;
     size_ = p.lpNorm<1>();
@@ -158,7 +156,8 @@ class FlatSupport {
     return apart;
   }
 
-  // A dx = b. Rigid contacts that stick leave open who bears how much; A is then singular, and any solution will do.
+  // Solves A dx = b. Rigid contacts that stick leave open how they share the force; A is then singular, and any
+  // solution will do.
   template <int Size>
   static Unknowns solution(const Equations& A, const Unknowns& b) noexcept {
     const Eigen::Matrix<double, Size, Size> square = A;
@@ -167,9 +166,9 @@ class FlatSupport {
     return solve_least_squares(A, b);
   }
 
-  // One Newton step with backtracking. Its linear system: (D_i − I) Σ dx_j − D_i dx_i/σ = −R_i for all i, σ = stiffer_.
-  // Returns true if the residual `apart` went down by at least a quarter of the step's share; with `bold`, the full
-  // step is taken and true returned in any case. Otherwise the forces are as before.
+  // One Newton step with backtracking, for the linear system (D_i − I) Σ dx_j − D_i dx_i/σ = −R_i for all i, σ =
+  // stiffer_. Returns true if the residual `apart` went down by at least a quarter of the step's share; otherwise the
+  // forces are unchanged. With `bold`, takes the full step and returns true.
   bool step(double K, const Vec3& p, double& apart, bool bold) noexcept {
     budget -= static_cast<int>(count * count * count);
     const Eigen::Index n = 3 * static_cast<Eigen::Index>(count);
@@ -204,7 +203,7 @@ class FlatSupport {
   double size_ = 0.0, stiffer_ = 1.0;
 };
 
-// Solves on tangent planes, which are taken again at each solution until r settles.
+// Solves on tangent planes, taken anew at each solution until r settles.
 bool settle(SharedSupport& support, FlatSupport& flat, double K, const Vec3& p, const Vec3& q) noexcept {
   Settling settling(q);
   for (int k = 0; k < most_settling; ++k) {
@@ -222,9 +221,8 @@ bool settle(SharedSupport& support, FlatSupport& flat, double K, const Vec3& p, 
   return false;
 }
 
-// The final r. The sum p + Σ f_i/K is known only to its own rounding, but a surface that can't give way (rigid, or a
-// layer pressed through to its core) says exactly where r is. A proxy that sticks to one of the contacts stays where it
-// was, bit for bit.
+// The final r. The sum p + Σ f_i/K has its own rounding, but a surface that can't yield (rigid, or a layer pressed
+// through to its core) gives r exactly. A proxy that sticks to a contact stays bit for bit.
 Vec3 placed(const SharedSupport& support, const FlatSupport& flat, const Vec3& q) noexcept {
   Vec3 r = flat.r;
   std::size_t hard = 0, rigid = most;
@@ -249,10 +247,10 @@ Vec3 placed(const SharedSupport& support, const FlatSupport& flat, const Vec3& q
 
 enum class Confirmed : std::uint8_t { yes, no, other_features };
 
-// Asks each obstacle itself, with its edges and its curvature, while the forces of the others are held.
+// Asks each obstacle itself, including its edges and curvature, with the forces of the others held.
 Confirmed confirm(SharedSupport& support, const FlatSupport& flat, double K, const Vec3& p, const Vec3& q) noexcept {
-  // A tolerance between two scales: where an edge or curvature makes a difference, it is far larger; rounding is
-  // smaller for objects of up to a hundred metres.
+  // A tolerance between two scales: edges and curvature cause far larger differences, rounding smaller ones for objects
+  // of up to a hundred metres.
   const double nothing = 1e-12 * (1.0 + p.lpNorm<1>() + q.lpNorm<1>());
   bool agree = true, others = false;
   for (std::size_t i = 0; i < flat.count; ++i) {
@@ -275,7 +273,6 @@ Confirmed confirm(SharedSupport& support, const FlatSupport& flat, double K, con
 }  // namespace
 
 bool SharedSupport::solve(double K, const Vec3& p, const Vec3& q) noexcept {
-  // Beyond this, rounding is as large as layers are thin.
   if (!((p - q).norm() <= farthest_m)) return false;
   FlatSupport flat;
   flat.count = count;
@@ -286,8 +283,8 @@ bool SharedSupport::solve(double K, const Vec3& p, const Vec3& q) noexcept {
     c.layer = obstacle[i]->layer();
     flat.x[i] = Vec3::Zero();
     if (!c.layer.soft()) continue;
-    // The first guess of a layer's force is that of its depth at q. It is exact where friction elsewhere holds the
-    // proxy; from zero, a sweep would only add K/k of it.
+    // The first guess of a layer's force is that of its depth at q. It is exact if friction elsewhere holds the proxy;
+    // a sweep from zero would add only a fraction K/k of it.
     const FlatSurface<3> surface = obstacle[i]->tangent(c.q, step[i].feature).surface;
     const double depth = std::clamp(-surface.height(c.q), 0.0, c.layer.thickness_m);
     flat.x[i] = (c.layer.stiffness_N_per_m / K * depth) * surface.normal();

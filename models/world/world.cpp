@@ -18,12 +18,12 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Up to so many obstacles that press all of their pairs and triples are tried, 10 in all. Of more, so many are chosen:
-// 20 pairs and triples, some microseconds each.
+// If up to `crowd` obstacles press, all their pairs and triples are tried, 10 in all. If more press, only `chosen` of
+// them count: 20 pairs and triples, some microseconds each.
 constexpr std::size_t crowd = 4, chosen = 5;
 constexpr int most_attempts = 64;
 
-// Two objects that hold the proxy between them, each by one of its features.
+// Two obstacles that hold the proxy between them, each with one feature.
 struct PairOfSurfaces {
   const Obstacle &a, &b;
   std::int32_t feature_a, feature_b;
@@ -36,8 +36,8 @@ struct SettledPair {
   Obstacle::Tangent t_a, t_b;
 };
 
-// Solves the groove of two tangent planes, which are taken again at each solution until it settles. Until then a
-// contact may pull, so that the iteration can go on; `found` is true only if both press in the end.
+// Solves the groove of two tangent planes, taken anew at each solution until it settles. On the way a contact may pull;
+// `found` is true only if both press in the end.
 SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, const Vec3& from,
                    GrooveSearch search) noexcept {
   const Vec3 q_a = pair.a.carry(q), q_b = pair.b.carry(q);
@@ -70,14 +70,14 @@ SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, con
   return out;
 }
 
-// Up to three planes that hold a point, and the nearest point to p on their free side.
+// Up to three planes that hold a point: the nearest point to p on their free side.
 class HoldingPlanes {
  public:
-  // Takes one more plane in, and lets those go that don't hold any more. False if no point is found.
+  // Adds one more plane and drops those that no longer hold. False if no point is found.
   bool exchange(const Obstacle::Step& plane, const Vec3& p, Vec3& r) noexcept {
     std::array<const Obstacle::Step*, 4> all{&plane};
     for (std::size_t i = 0; i < count_; ++i) all[i + 1] = planes_[i];
-    // Of all sets of them, the smallest ones first, the one whose point is on the free side of all.
+    // Of all sets of the planes, smallest first: the first set whose point is on the free side of all planes.
     const unsigned sets = 1u << (count_ + 1);
     for (int size = 1; size <= 3; ++size) {
       for (unsigned set = 1; set < sets; ++set) {
@@ -94,7 +94,7 @@ class HoldingPlanes {
  private:
   bool hold(const std::array<const Obstacle::Step*, 4>& all, unsigned set, const Vec3& p, Vec3& r) noexcept {
     std::array<const Obstacle::Step*, 3> planes{};
-    Mat3 G = Mat3::Identity();  // of the normals; beyond the set's size, nothing
+    Mat3 G = Mat3::Identity();  // dot products of the normals; identity beyond the set's size
     Vec3 depth = Vec3::Zero();
     std::size_t n = 0;
     for (std::size_t i = 0; i < all.size(); ++i) {
@@ -129,13 +129,13 @@ class HoldingPlanes {
 }  // namespace
 
 struct World::Choice : NearestSet {
-  std::array<Contact<3>, 3> contacts{};  // in shared_ where they share the force
+  std::array<Contact<3>, 3> contacts{};  // in shared_ if `shared`
   std::size_t count = 0;
   bool shared = false;
-  bool free = false;  // nothing in the way of p
+  bool free = false;  // p is reached without contact
   bool resolved = true;
 
-  // True if this set is better than what was there; the caller then fills in its contacts.
+  // True if this set is better than the best so far; the caller then fills in its contacts.
   bool better(const Vec3& p, const Vec3& at, std::size_t contact_count) noexcept {
     if (!improve(p, at)) return false;
     count = contact_count;
@@ -155,8 +155,8 @@ void World::Candidates::add(std::size_t i, const Obstacle::Step& step) noexcept 
   grew = true;
 }
 
-// Adds another face of a mesh that is a candidate already. It counts only together with other candidates: alone, the
-// mesh has found its step itself.
+// Adds another face of a mesh that is already a candidate. It counts only together with other candidates: for the mesh
+// alone, Obstacle::step has already solved all faces.
 void World::add_face(std::size_t i, const Obstacle::Step& step, Candidates& candidates) noexcept {
   if (candidates.count == Candidates::most || !step.touches) return;
   for (std::size_t c = 0; c < candidates.count; ++c) {
@@ -192,17 +192,17 @@ void World::set_time(const StepTime& time) noexcept {
   for (const std::size_t i : moving_) entries_[i].obstacle->set_time(time.time_s, time.period_s);
 }
 
-// Gathers into near_ all obstacles that the step can meet; returns the radius of the ball around (p + q)/2 that was
-// searched, at least `reach`. Where the free space is convex, (r − p)ᵀ(r − q) ≤ 0, so r lies in the ball with the
-// diameter qp (Thales). Around a convex solid of radius R it may lie outside by ‖r − q‖²/2R; twice the radius covers
-// this. Layers that spring back and moving objects can take r farther: operator() then gathers again.
+// Gathers into near_ all obstacles that the step can meet. Returns the radius of the searched ball around (p + q)/2, at
+// least `reach`. In convex free space (r − p)ᵀ(r − q) ≤ 0, so r lies in the ball with the diameter qp (Thales). Around
+// a convex solid of radius R it may lie outside by ‖r − q‖²/2R; twice the radius covers this. If springy layers or
+// moving objects take r farther, operator() gathers again.
 double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
   const Vec3 middle = 0.5 * (p + q);
   const double radius = std::max(reach, (p - q).norm() * (1.0 + 1e-9) + 1e-12 * (1.0 + p.lpNorm<1>()));
   near_.resize(near_fixed_);
   if (!((middle - near_centre_).norm() + radius <= near_radius_)) {
-    // Twice the radius and a millimetre more than needed, so that a proxy in contact, which moves by micrometres, asks
-    // the tree once in many steps. A larger margin would make each step look at more obstacles.
+    // Twice the radius plus a millimetre, so that a proxy in contact, which moves by micrometres, rarely asks the tree.
+    // More would make each step test more obstacles.
     near_radius_ = 2.0 * radius + 1e-3;
     near_centre_ = middle;
     near_.clear();
@@ -210,7 +210,7 @@ double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
       if (entries_[i].obstacle->distance(middle) <= near_radius_) near_.push_back(i);
     }
     tree_.within(middle, near_radius_, [&](std::size_t i) { near_.push_back(i); });
-    std::sort(near_.begin(), near_.end());  // so that results don't depend on the order in which the tree finds them
+    std::sort(near_.begin(), near_.end());  // so that results don't depend on the tree's order
     near_fixed_ = near_.size();
   }
   for (const std::size_t i : moving_) {
@@ -230,7 +230,7 @@ void World::add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& c
   for (const Pressed& pressed : pressed_) candidates.add(pressed.index, pressed.step);
 }
 
-// Adds to pressed_ what isn't in the way to p, but in the way to r. True if there is any.
+// Adds to pressed_ the obstacles that aren't in the way to p, but in the way to r. True if there are any.
 bool World::add_those_at(double K, const Vec3& p, const Vec3& q, const Vec3& r) noexcept {
   const std::size_t before = pressed_.size();
   for (const std::size_t i : near_) {
@@ -246,10 +246,11 @@ bool World::add_those_at(double K, const Vec3& p, const Vec3& q, const Vec3& r) 
   return pressed_.size() > before;
 }
 
-// Leaves those of pressed_ that hold the proxy if each is the plane that would hold it alone, and nothing rubs, and
-// then those that are next: the projection of p onto a polyhedron. Of the planes that hold the point, and the one that
-// it is deepest behind, the nearest point on their free side comes next, until it is on the free side of all (a dual
-// method: the distance to p grows each time, so that no set comes twice). A billionth of that distance is let pass.
+// Reduces pressed_ to the obstacles that would hold the proxy without friction, and the next nearest ones. Each
+// obstacle counts as its plane at the step alone, and p is projected onto the planes' polyhedron by a dual method: to
+// the planes that hold the point, add the plane that it is deepest behind, and move to the nearest point to p on their
+// free side, until the point is on the free side of all. The distance to p grows each time, so no set comes twice.
+// Depths up to a billionth of that distance are ignored.
 void World::choose(double K, const Vec3& p, const Vec3& q) noexcept {
   constexpr int most_exchanges = 64;
   constexpr double passed = 1e-9;
@@ -266,8 +267,8 @@ void World::choose(double K, const Vec3& p, const Vec3& q) noexcept {
   for (const Pressed& pressed : pressed_) {
     if (holding.has(pressed.step)) likely_[likely_count_++] = pressed.index;
   }
-  // Those that hold it have a depth of zero, others less; then in the order in which they were, on which results
-  // depend.
+  // Planes that hold the point have depth zero, others less. Ties are broken by index, because results depend on the
+  // order.
   std::partial_sort(pressed_.begin(), pressed_.begin() + chosen, pressed_.end(),
                     [&](const Pressed& a, const Pressed& b) {
                       return depth(a) != depth(b) ? depth(a) > depth(b) : a.index < b.index;
@@ -276,8 +277,8 @@ void World::choose(double K, const Vec3& p, const Vec3& q) noexcept {
   std::sort(pressed_.begin(), pressed_.end(), [](const Pressed& a, const Pressed& b) { return a.index < b.index; });
 }
 
-// Whether the proxy gets from q to r around an obstacle that is in the straight way: over the edge where the obstacle
-// lets go of it. All other obstacles must let it pass there, too.
+// Whether the proxy gets from q to r around an obstacle in the straight way: over the edge where the obstacle releases
+// it. All other obstacles must let it pass there, too.
 bool World::gets_around(const Obstacle& obstacle, const Vec3& p, const Vec3& q, const Vec3& r) const noexcept {
   const Vec3 edge = obstacle.detour(p, q);
   if (edge == q || obstacle.excludes(edge, r)) return false;
@@ -293,8 +294,8 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
   for (const std::size_t i : near_) {
     const Obstacle& obstacle = *entries_[i].obstacle;
     const bool member = std::find(contacts.begin(), contacts.end(), i) != contacts.end();
-    // A mesh that holds the proxy with one face may be in its way with another. Alone, the mesh has taken care of that
-    // itself, so only sets of two and more are checked.
+    // A mesh that holds the proxy with one face may be in its way with another. A mesh alone has solved that itself, so
+    // only sets of two and more are checked.
     Vec3 normal;
     if (member && (contacts.size() < 2 || !obstacle.parts(obstacle.carry(q), r, normal))) continue;
     const bool presses = !member && soft_ && obstacle.presses_at(r);
@@ -303,12 +304,12 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
     all = false;
     const bool known = candidates.has(i);
     if (known && !member && !obstacle.parts(obstacle.carry(q), r, normal)) continue;
-    // The obstacle isn't in the way to p, but in the way to r. Its step towards r tells by which of its features.
+    // The obstacle isn't in the way to p, but in the way to r. Its step towards r gives the feature.
     Obstacle::Step s = obstacle.step(K, r, q);
     if (known) {
       add_face(i, s, candidates);
     } else {
-      // One that is in the way to p, too, but wasn't chosen from the crowd, holds the proxy alone where it would then.
+      // An obstacle that is also in the way to p, but wasn't chosen from the crowd, gets its step towards p.
       const Obstacle::Step alone = obstacle.step(K, p, q);
       if (s.touches && alone.touches) s = alone;
       s.touches = alone.touches && s.touches;
@@ -318,9 +319,9 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
   return all;
 }
 
-// Whether all of the objects are at r. Pairs and triples are solved on tangent planes, and a face's plane continues
-// beyond its edges, where nothing holds a proxy. The tolerance lies between two scales: rounding is smaller for objects
-// of up to a hundred metres, and a proxy that is held 1e-12 m off a face's edge is held at the edge.
+// Whether all these obstacles are at r: pairs and triples are solved on planes, but beyond a face's edges its plane
+// holds nothing. The tolerance lies between two scales: rounding is smaller for objects of up to a hundred metres, and
+// a proxy held 1e-12 m off a face's edge counts as held at the edge.
 bool World::all_touch(const Vec3& r, std::span<const std::size_t> contacts) const noexcept {
   const double nothing = 1e-12 * (1.0 + r.lpNorm<1>());
   return std::all_of(contacts.begin(), contacts.end(),
@@ -344,7 +345,6 @@ StepResult World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates
   return choice.result(candidates.grew);
 }
 
-// The contact that a candidate's obstacle reports if it presses together with others.
 Contact<3> World::contact_of(const Candidates& candidates, std::size_t candidate, bool slips,
                              const Vec3& normal) const noexcept {
   const Entry& entry = entries_[candidates.index[candidate]];
@@ -360,14 +360,14 @@ void World::try_pair(double K, const Vec3& p, const Vec3& q, std::array<std::siz
   const PairOfSurfaces pair{*entries_[m[0]].obstacle, *entries_[m[1]].obstacle, candidates.alone[own[0]].feature,
                             candidates.alone[own[1]].feature};
   SettledPair s = settle(pair, p, q, q, GrooveSearch::first_root);
-  // A contact that pulls at the first root may press at another one.
+  // A contact that pulls at the first root may press at another.
   if (s.settled && !s.groove.found) s = settle(pair, p, q, s.r, GrooveSearch::all_roots);
   if (!s.groove.found || !fits(q, s.r, m, candidates, K, p) || !all_touch(s.r, m) || !choice.better(p, s.r, 2)) return;
   choice.contacts[0] = contact_of(candidates, own[0], s.groove.slips1, s.t_a.surface.normal());
   choice.contacts[1] = contact_of(candidates, own[1], s.groove.slips2, s.t_b.surface.normal());
 }
 
-// Solves the corner of three tangent planes, which are taken again at each new corner until it settles.
+// Solves the corner of three tangent planes, taken anew at each new corner until it settles.
 void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<std::size_t, 3>& own,
                        Candidates& candidates, Choice& choice) noexcept {
   if (!may_try()) return;
@@ -407,8 +407,8 @@ void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<
   }
 }
 
-// In a crowd: one alone, or else those that would hold the proxy without friction. Before all other sets, since each of
-// these that fails brings in more of the crowd.
+// In a crowd, tries single obstacles, then the set that would hold the proxy without friction. Other sets come later,
+// because each that fails brings in more of the crowd.
 bool World::try_likely(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
   try_singles(K, p, q, candidates, choice);
   if (choice.found() || likely_count_ < 2) return choice.found();
@@ -480,7 +480,7 @@ bool World::search(double K, const Vec3& p, const Vec3& q, Candidates& candidate
       });
 }
 
-// Whether all obstacles that are near allow a proxy from q to end at r.
+// Whether all near obstacles allow a proxy from q to end at r.
 bool World::is_free(const Vec3& q, const Vec3& r) const noexcept {
   return std::none_of(near_.begin(), near_.end(), [&](std::size_t i) {
     const Obstacle& obstacle = *entries_[i].obstacle;
@@ -488,8 +488,8 @@ bool World::is_free(const Vec3& q, const Vec3& r) const noexcept {
   });
 }
 
-// The fallback where no set is complete: the proxy stays where it is if it may be there; otherwise the obstacle that
-// takes it nearest to p brings it out.
+// The fallback if no set is complete: the proxy stays if it is allowed at q. Otherwise it takes the step of the one
+// obstacle whose step ends nearest to p.
 void World::stay(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept {
   const bool allowed = is_free(q, q);
   for (std::size_t c = 0; c < candidates.count; ++c) {
@@ -529,8 +529,8 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexce
   if (search(K, p, q, candidates, choice)) return choice.resolved;
   candidates.around = true;
   if (search(K, p, q, candidates, choice)) return choice.resolved;
-  // Beyond the radius of a curved surface, or on a far step past several objects, the iteration on tangent planes may
-  // find nothing. The proxy then goes as far as a shorter step leads: the way to p is halved up to six times.
+  // Beyond the radius of a curved surface, or on a long step past several objects, the iteration on tangent planes may
+  // find nothing. The proxy then goes as far as a shorter step leads: p is moved halfway towards q, up to six times.
   Vec3 nearer = p;
   for (int k = 0; k < 6 && !choice.found(); ++k) {
     nearer = 0.5 * (nearer + q);
@@ -539,7 +539,7 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexce
     if (fewer.count > 0) {
       search(K, nearer, q, fewer, choice);
     } else {
-      choice.improve(p, nearer);  // nothing is in the way so far
+      choice.improve(p, nearer);  // this shorter way is free
     }
   }
   if (!choice.found()) stay(p, q, candidates, choice);
@@ -572,8 +572,8 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
   support_budget_ = SharedSupport::whole_budget;
   Choice choice;
   bool found = solve(K, p, q, choice);
-  // A moving object, a layer that springs back, or an obstacle that the proxy has to leave may take r out of the ball
-  // that was searched. The step is then repeated with all obstacles near its end.
+  // A moving object, a layer that springs back, or an obstacle that the proxy has to leave may take r out of the
+  // searched ball. The step is then repeated with all obstacles near its end.
   for (std::size_t known = 0; known != near_.size() && !choice.free;) {
     known = near_.size();
     const double away = (choice.r - 0.5 * (p + q)).norm();
@@ -590,8 +590,8 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
   count_ = choice.count;
   are_shared_ = choice.shared;
   if (choice.free && moving_.empty()) {
-    // Nothing is in the way: the clearance at p lets later steps be free without a look. With moving objects it would
-    // not stay valid.
+    // The step is free: with the clearance at p, later steps can be free without a search. Moving objects would
+    // invalidate it.
     double room = infinity;
     for (const std::size_t i : unbounded_) room = std::min(room, entries_[i].obstacle->distance(p));
     clearance_ = tree_.nearest(p, room, [&](std::size_t i) { return entries_[i].obstacle->distance(p); });

@@ -1,19 +1,17 @@
-// Any number of obstacles at once.
+// A world of any number of obstacles.
 //
-// Each obstacle near the step says what it would do alone. If all others allow that point, it is the solution.
+// Each obstacle near the step is asked for its step alone. If all others allow that point, it is the solution.
 // Otherwise pairs and triples of contacts are solved as in a PlaneComposition (contact_search.hpp), on the tangent
-// planes at the solution itself. A curved surface's plane is taken again at each new point until the point settles
-// (settling.hpp); the error shrinks by penetration over radius each time. Among complete sets, fewer contacts come
-// first, then the smallest ‖r − p‖.
+// planes at the solution itself. For curved surfaces the planes are taken anew at each point until it settles
+// (settling.hpp). Among complete sets, fewer contacts come first, then the smallest ‖r − p‖.
 //
-// Where many objects meet in one place, pairs and triples of all that press would be too many: from the fifth on, those
-// are chosen that hold the proxy without friction (World::choose), these are tried first, then their sets, and no more
-// than most_attempts in a step. So a step among a thousand objects costs little more than one among ten; what isn't
-// found within that counts as unresolved.
+// If five or more objects press in one place, World::choose picks those that would hold the proxy without friction.
+// They are tried first, then other sets, up to most_attempts in a step. So a step among a thousand objects costs little
+// more than one among ten; a step still without a solution counts as unresolved.
 //
-// Where an elastic layer presses together with other obstacles, all that press share the force (shared_support.hpp).
+// If an elastic layer presses together with other obstacles, all that press share the force (shared_support.hpp).
 //
-// A step is first compared with the last known clearance: if both q and p are within it, the step touches nothing.
+// A step with q and p within the last known clearance touches nothing and skips all this.
 #pragma once
 
 #include <array>
@@ -30,11 +28,11 @@ namespace proxarm::models {
 
 class World final : public GeometricAlgorithm<3> {
  public:
-  // `object` is what contacts report. Several obstacles may be one object: a box from inside is six.
+  // Contacts report `object`. Several obstacles may be one object: a box seen from inside is six.
   struct Entry {
     std::unique_ptr<Obstacle> obstacle;
     std::int32_t object = 0;
-    std::int32_t feature = -1;  // reported; -1: the obstacle's own
+    std::int32_t feature = -1;  // reported; -1: the obstacle's feature
   };
   explicit World(std::vector<Entry> entries);
 
@@ -45,11 +43,11 @@ class World final : public GeometricAlgorithm<3> {
     return {are_shared_ ? shared_.data() : contacts_.data(), count_};
   }
 
-  // Signed distance to the nearest obstacle, metres; infinite if there is none.
+  // Signed distance to the nearest obstacle, metres; infinite in an empty world.
   [[nodiscard]] double distance(const Vec3& x) const noexcept;
 
-  // How far a point gets on the straight way from x to y before an obstacle stops it. This is for a proxy that has no
-  // other way to go, as on a guide. Precondition: no obstacle excludes x.
+  // How far a point gets along the straight way from x to y before an obstacle stops it. For a proxy with no other way
+  // to go, as on a guide. Precondition: no obstacle excludes x.
   struct Sweep {
     Vec3 end;
     bool stopped = false;
@@ -57,23 +55,21 @@ class World final : public GeometricAlgorithm<3> {
   };
   [[nodiscard]] Sweep sweep(const Vec3& x, const Vec3& y) noexcept;
 
-  // Steps so far for which no set of contacts was complete (a jam, or a tool deeper than a curved surface's radius).
-  // The proxy then goes as far as a shorter step leads, or stays where it was.
+  // Steps so far in which no set of contacts was complete: a jam, or a tool deeper than a curved surface's radius. The
+  // proxy then goes as far as a shorter step leads, or stays.
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
   [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
 
  private:
-  // The obstacles that may be part of the solution, and what each would do alone. Up to three contacts hold a proxy,
-  // and typical steps have one to three candidates. What comes after the twelfth is left out: the step then counts as
-  // unresolved, if no set of these is complete.
+  // The obstacles that may be part of the solution, and their steps alone. Typical steps have one to three. Candidates
+  // beyond the twelfth are dropped; the step counts as unresolved if no set of the twelve is complete.
   struct Candidates {
     static constexpr std::size_t most = 12;
     std::array<std::size_t, most> index{};
     std::array<Obstacle::Step, most> alone{};
     std::size_t count = 0;
     bool grew = false;
-    bool around =
-        false;  // points beyond an object count as reached where it lets the proxy go around, see gets_around()
+    bool around = false;  // points beyond an object count as reached if it lets the proxy go around, see gets_around()
 
     void clear() noexcept {
       count = 0;
@@ -117,30 +113,29 @@ class World final : public GeometricAlgorithm<3> {
 
   std::vector<Entry> entries_;
   std::vector<std::size_t> unbounded_;  // obstacles without finite bounds
-  std::vector<std::size_t> moving_;     // those that move, bounded or not
+  std::vector<std::size_t> moving_;     // moving ones, bounded or not
   BoundsTree tree_;                     // all others
-  std::vector<bool> elastic_;           // which of all have elastic layers
-  bool soft_ = false;                   // some have
-  // The obstacles that a step may meet. First come those that stand still and are within near_radius_ of near_centre_;
-  // they are gathered again only when a step leaves that ball. Then come the moving obstacles that are close in this
-  // step.
+  std::vector<bool> elastic_;           // for each obstacle: whether it has an elastic layer
+  bool soft_ = false;                   // whether any has
+  // The obstacles that a step may meet: first the resting ones within near_radius_ of near_centre_, gathered anew only
+  // when a step leaves that ball; then the moving ones that are close in this step.
   std::vector<std::size_t> near_;
   std::size_t near_fixed_ = 0;
   Vec3 near_centre_ = Vec3::Zero();
   double near_radius_ = -1.0;
-  Candidates candidates_;  // of this step; a member, so that a step needn't initialise all of it
+  Candidates candidates_;  // a member, so that a step needn't initialise all of it
   std::array<Contact<3>, 3> contacts_{};
-  std::array<Contact<3>, Candidates::most> shared_{};  // instead of those, where elastic ones share the force
+  std::array<Contact<3>, Candidates::most> shared_{};  // used instead of contacts_ if elastic layers share the force
   bool are_shared_ = false;
-  std::vector<Pressed> pressed_;         // of this step; room for all
+  std::vector<Pressed> pressed_;         // of this step; reserved for all obstacles
   std::array<std::size_t, 3> likely_{};  // obstacles of a crowd that would hold the proxy without friction
   std::size_t likely_count_ = 0;
-  int attempts_left_ = 0;   // pairs and triples that may still be tried in this step
+  int attempts_left_ = 0;   // pairs and triples that this step may still try
   int support_budget_ = 0;  // what SharedSupport may still spend in this step
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;
   bool squeezed_ = false;
-  // No obstacle is closer than clearance_ to clear_at_. Used only while nothing moves.
+  // No obstacle is closer than clearance_ to clear_at_. Used only in worlds without moving obstacles.
   Vec3 clear_at_ = Vec3::Zero();
   double clearance_ = -1.0;
 };

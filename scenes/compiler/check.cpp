@@ -26,7 +26,6 @@ using models::Vec3;
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// One state and what came of it.
 template <int N>
 struct State {
   double K = 0.0;
@@ -66,7 +65,7 @@ double condition(const State<N>& s) {
   return models::rounding_amplification<N>(s.contacts);
 }
 
-// Whether the contacts can bear f within what rounding explains: 0 if they can, 2 (a failure) if not.
+// 0 if the contacts can bear f within rounding, 2 (a failure) if not.
 template <int N>
 double outside_laws(const State<N>& s, const CheckRegion<N>& region) {
   const double viscous = region.viscous_N_per_m ? region.viscous_N_per_m(s.q) : 0.0;
@@ -125,7 +124,7 @@ class Checker {
     }
   }
 
-  // The first of its kind is kept.
+  // Keeps the first state of each kind.
   void count(std::int64_t& sum, std::string& first, const State<N>& s, const std::string& more = {}) {
     if (sum++ == 0) first = s.text() + more;
   }
@@ -139,8 +138,7 @@ class Checker {
   void one() {
     ++report_.states;
     const double K = random_.log_uniform(1.0, 1e7);
-    // q must be where the world lets a proxy be: it has come to rest, and has slid a little in two thirds of the
-    // states.
+    // q must be a possible place of a proxy: let it come to rest and, in two thirds of the states, slide a little.
     const Vec<N> x = start();
     Vec<N> q = g_(K, x, g_(K, x, x));
     const int slides = static_cast<int>(random_.uniform(0.0, 3.0));
@@ -171,7 +169,7 @@ class Checker {
     const double allowed = condition(s) * 64.0 * epsilon * (sizes + f.norm() / kappa) +
                            (region_.has_coulomb_medium ? 2048.0 * epsilon * sizes : 0.0);
     const double error = (other.r - s.r).norm() / allowed;
-    // Where both answers keep the laws, Coulomb's law itself has several solutions; the algorithm isn't wrong.
+    // If both answers keep the laws, Coulomb's law itself has several solutions, and the algorithm is right.
     const bool lawful =
         region_.bends || (region_.friction && !region_.acts_without_contact && !(outside_laws(other, region_) > 1.0));
     const std::string more = ", κ = " + std::to_string(kappa);
@@ -204,7 +202,7 @@ Vec3 onto(const Space& space, const Vec3& x_W) {
   return space.origin_m + axes * (axes.transpose() * (x_W - space.origin_m));
 }
 
-// Points of the proxy's space just outside of an object's surface, near enough for states to push onto it, found by
+// Points of the proxy's space just outside of an object's surface, near enough for states to push onto it. Found by
 // Newton steps along the gradient of the distance.
 std::vector<Vec3> around(const Object& object, const Space& space, Random& random, int count, double deepest_m) {
   const Vec3 middle = middle_of(object.shape);
@@ -220,7 +218,7 @@ std::vector<Vec3> around(const Object& object, const Space& space, Random& rando
         const Vec3 axis = space.dimensions == 3 ? Vec3(Vec3::Unit(a)) : Vec3(space.axes.col(a));
         slope += (distance_to(object, x + h * axis) - d) / h * axis;
       }
-      // Within a space that cuts the object, the gradient is shorter than one.
+      // In a space that cuts the object, the gradient is shorter than one.
       x -= (d - off) / (space.dimensions == 3 ? 1.0 : std::max(slope.squaredNorm(), 0.1)) * slope;
       if (std::abs(d - off) < 0.1 * off) break;
     }
@@ -229,8 +227,8 @@ std::vector<Vec3> around(const Object& object, const Space& space, Random& rando
   return places;
 }
 
-// Free points of a guide, half of them within 2 mm of an object: found from a random point by steps along the guide,
-// each as long as the clearance allows.
+// Free points of a guide, half of them within 2 mm of an object. Found from random points by steps along the guide,
+// each as long as the clearance.
 std::vector<Vec3> on_guide(const Scene& scene, const Clearances& clearances, Random& random) {
   GuideDescription guide = guide_in_space(scene);
   if (scene.space.dimensions < 3) {
@@ -267,14 +265,14 @@ template <int N>
 CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, const CheckOptions& options) {
   const CompiledScene compiled = compile(scene);
   models::GeometricAlgorithm<N>& g = compiled.algorithm<N>();
-  g.set_time({.time_s = 0.0, .period_s = 0.0});  // a period of zero makes everything stand still
+  g.set_time({.time_s = 0.0, .period_s = 0.0});  // a period of zero stops all motion
   CheckRegion<N> region;
   region.friction.emplace();
   for (const Object& object : scene.objects) {
     region.friction->push_back(object.friction);
     region.soft = region.soft || object.layer.has_value();
   }
-  // Contacts don't say which friction region of a mesh they are on, so their friction counts as unknown.
+  // Contacts don't report the friction region of a mesh, so its friction counts as unknown.
   const auto has_regions = [](const Object& object) { return !object.friction_regions.empty(); };
   if (std::any_of(scene.objects.begin(), scene.objects.end(), has_regions)) region.friction.reset();
   region.touches = !scene.objects.empty() && !scene.guide;
@@ -297,12 +295,12 @@ CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, con
   }
   region.bends = scene.guide && scene.guide->kind == GuideDescription::Kind::polyline;
   if (scene.guide) region.centre = compiled.from_W<N>(scene.guide->points_m.front());
-  // A proxy gets onto a guide before it meets objects.
+  // A proxy reaches a guide before it meets objects.
   Random random(options.seed);
   const bool guided = scene.guide && !scene.objects.empty();
   const Clearances clearances(scene);
   for (const Vec3& x : guided ? on_guide(scene, clearances, random) : places) {
-    // Only places outside of all other objects will do.
+    // Use only places outside of all other objects.
     if (clearances.of_point(x) >= 0.0) region.places.push_back(compiled.from_W<N>(x));
   }
   return Checker<N>(g, region, options).run();
@@ -391,7 +389,7 @@ template CheckReport check_algorithm<3>(models::GeometricAlgorithm<3>&, const Ch
 
 namespace {
 
-// The least radius among round solid objects; infinite if there are none.
+// Smallest radius of the round solid objects; infinite without any.
 double least_radius_m(const Scene& scene) {
   double least = infinity;
   for (const Object& object : scene.objects) {

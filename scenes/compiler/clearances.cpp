@@ -22,7 +22,7 @@ Pose back_to_description(const Object& object, double time_s) {
   return moves ? script_of(*object.motion).at(time_s).inverse(Eigen::Isometry) : Pose::Identity();
 }
 
-// Whether an open mesh is between the two.
+// True if an open mesh lies between the two.
 bool separates(const Object& object, const Vec3& x, const Vec3& y) {
   return is_open_mesh(object) && std::get<MeshShape>(object.shape).mesh->first_hit(x, y).any();
 }
@@ -38,7 +38,7 @@ Clearances::Clearances(const Scene& scene) : objects_(scene.objects) {
       others_.push_back(i);
       continue;
     }
-    // A little more than its size, for rounding.
+    // Slightly enlarged, for rounding.
     const Vec3 middle = middle_of(object.shape), reach = Vec3::Constant(1.000001 * size_of(object.shape));
     leaves.push_back({{middle - reach, middle + reach}, i});
   }

@@ -31,7 +31,7 @@ using Entries = std::vector<models::World::Entry>;
 
 template <int N>
 using Algorithm = CompiledScene::Algorithm<N>;
-using SpaceAlgorithm = Algorithm<3>;  // of a space of N dimensions, lifted to three
+using SpaceAlgorithm = Algorithm<3>;  // lifts a 𝒢 of N dimensions to three
 
 const Object& object_at(const Scene& scene, std::int32_t index) {
   return scene.objects[static_cast<std::size_t>(index)];
@@ -42,11 +42,10 @@ bool has_friction(const Object& object) {
                                               [](const FrictionRegion& region) { return region.friction > 0.0; });
 }
 
-// ---- What is chosen
-// --------------------------------------------------------------------------------------------------
+// ---- Choice
 
-// A mesh's sides hold from both of them, and must outlast its motion: a stop on a line is nearer to it than that
-// allows.
+// Both sides of a mesh hold the proxy, and a moving mesh must not pass it. A stop on a line is nearer to the mesh than
+// that allows.
 void require_no_moving_mesh(const Scene& scene) {
   for (const Object& object : scene.objects) {
     if (!object.motion || !std::holds_alternative<MeshShape>(object.shape)) continue;
@@ -75,7 +74,7 @@ Plan::Contacts contacts_of(const Scene& scene, const Plan& plan, const Cut<N>& c
   if (cut.planes.size() == 1) {
     return N > 1 && object_at(scene, cut.planes.front().object).friction > 0.0 ? friction_plane : plane;
   }
-  // Flat surfaces have no bounds that a tree could use; looking at each is as good, and this many are few.
+  // A tree can't help, as flat surfaces are unbounded; checking each of up to 64 is quick.
   return cut.planes.size() <= 64 ? planes : world;
 }
 
@@ -87,10 +86,12 @@ void count(const Scene& scene, const Cut<N>& cut, Plan& plan) {
     const Object& object = object_at(scene, index);
     plan.layers += object.layer ? 1 : 0;
     plan.moving += object.motion ? 1 : 0;
-    // Beside a guide along a line no other friction acts: there is one way to go, and what stops the proxy holds it.
+    // With a guide along a line, no other friction acts: there is only one direction, and an object in it stops the
+    // proxy.
     if (plan.contacts != Plan::Contacts::guide_among_objects) friction = friction || has_friction(object);
   };
-  for (const auto& plane : cut.planes) meets(plane.object);  // rigid and still, so it's no matter that faces repeat it
+  // Rigid and at rest, so it doesn't matter that several faces name the same object.
+  for (const auto& plane : cut.planes) meets(plane.object);
   for (const Ball& ball : cut.balls) meets(ball.object);
   for (const Solid& solid : cut.solids) {
     if (!solid.parts.empty()) meets(solid.object);
@@ -102,7 +103,7 @@ void count(const Scene& scene, const Cut<N>& cut, Plan& plan) {
   if (friction) plan.friction = N > 1 ? Plan::Friction::acts : Plan::Friction::no_tangent;
 }
 
-// The scene's object that all contacts are with.
+// The object of all contacts, if there is only one.
 template <int N>
 std::optional<std::int32_t> only_object(const Plan& plan, const Cut<N>& cut) {
   if (plan.contacts == Plan::Contacts::mesh) return 0;
@@ -132,8 +133,7 @@ Plan plan_of(const Scene& scene, std::optional<GuideDescription> guide, const Cu
   return plan;
 }
 
-// ---- How it is built
-// -------------------------------------------------------------------------------------------------
+// ---- Construction
 
 template <int N>
 Algorithm<N> in_space(SpaceAlgorithm lifted) {
@@ -152,7 +152,7 @@ Algorithm<N> friction_plane(const Scene& scene, const HalfSpace<N>& plane, Compi
   return wall;
 }
 
-// The friction of an object that the space has cut: a line has no tangent to slip along.
+// Friction of an object in the space: a line has no tangent to slip along.
 template <int N>
 double friction_in_space(const Scene& scene, std::int32_t object) {
   return N > 1 ? object_at(scene, object).friction : 0.0;
@@ -169,7 +169,7 @@ SpaceAlgorithm plane_composition(const Scene& scene, const Cut<N>& cut, Compiled
   if (N == 1) return composition;
   std::int32_t last = -1;
   for (const auto& plane : cut.planes) {
-    if (std::exchange(last, plane.object) == plane.object) continue;  // once for an object
+    if (std::exchange(last, plane.object) == plane.object) continue;  // once per object
     out.friction_setters.emplace_back(plane.object, [planes = composition.get(), object = plane.object](double mu) {
       planes->set_friction(object, mu);
     });
@@ -177,7 +177,7 @@ SpaceAlgorithm plane_composition(const Scene& scene, const Cut<N>& cut, Compiled
   return composition;
 }
 
-// A mesh that is all there is, without a world around it.
+// A mesh as the whole scene, without a World.
 SpaceAlgorithm mesh_surface(const Scene& scene, CompiledScene& out) {
   const Object& object = scene.objects.front();
   auto surface = std::make_unique<models::MeshSurface>(std::get<MeshShape>(object.shape).mesh, object.friction,
@@ -200,12 +200,12 @@ std::unique_ptr<models::Obstacle> moved(const Scene& scene, std::int32_t index, 
   return driven;
 }
 
-// What a guide on a plane is among objects: the half-spaces on both its sides, in contacts as one more object.
+// A guide on a plane among objects: the half-spaces on both its sides, reported as one more object.
 void add_plane_guide(const GuideDescription& guide, std::int32_t index, Entries& entries) {
   for (const double side : {1.0, -1.0}) {
     auto half =
         std::make_unique<models::PlaneObstacle>(guide.points_m.front(), Vec3(side * guide.direction), guide.friction);
-    half->set_slack(8.0);  // a point on either surface is behind the other by the rounding of both
+    half->set_slack(8.0);  // a point on either surface is behind the other one by the rounding of both
     entries.push_back({std::move(half), index, side > 0.0 ? 0 : 1});
   }
 }
@@ -238,7 +238,7 @@ template <int N>
 SpaceAlgorithm world(const Scene& scene, Cut<N> cut, CompiledScene& out) {
   Entries entries = entries_of<N>(scene, std::move(cut), out);
   for (const models::World::Entry& entry : entries) {
-    // Friction by triangle stays as the scene has it.
+    // Friction by triangle can't be changed.
     if (N == 1 || !object_at(scene, entry.object).friction_regions.empty()) continue;
     out.friction_setters.emplace_back(entry.object,
                                       [obstacle = entry.obstacle.get()](double mu) { obstacle->set_friction(mu); });
@@ -332,7 +332,7 @@ CompiledScene compile(const Scene& scene) {
   CompiledScene out;
   out.name = scene.name;
   out.source = std::make_shared<const Scene>(scene);
-  // Three dimensions are all of W, in its own coordinates.
+  // Three dimensions use W's coordinates.
   if (scene.space.dimensions < 3) out.space = scene.space;
   for (const Object& object : scene.objects) out.frictions.push_back(object.friction);
   switch (scene.space.dimensions) {

@@ -1,5 +1,5 @@
-// What the proxy's space has of a scene, sorted by what it takes to render it. In three dimensions that is all of it;
-// in fewer, sections (section.hpp).
+// The part of a scene within the proxy's space, sorted by how it is rendered. In three dimensions that is the whole
+// scene; in fewer, sections (section.hpp).
 #pragma once
 
 #include <cstdint>
@@ -10,43 +10,43 @@
 
 namespace proxarm::scenes {
 
-// A plane of W cut by the proxy's space: a half-space of fewer dimensions.
+// A plane of W, cut by the proxy's space: a half-space of fewer dimensions.
 template <int N>
 struct HalfSpace {
-  std::int32_t object = 0;   // its index in the scene
+  std::int32_t object = 0;   // index in the scene
   std::int32_t feature = 0;  // of the object
   models::Vec<N> point = models::Vec<N>::Zero();
   models::Vec<N> normal = models::Vec<N>::Zero();
 };
 
-// A sphere cut by the space: one of fewer dimensions.
+// A sphere, cut by the space: a sphere of fewer dimensions.
 struct Ball {
   std::int32_t object = 0;
-  models::Vec3 centre = models::Vec3::Zero();  // in coordinates of the space, then zeros
+  models::Vec3 centre = models::Vec3::Zero();  // in coordinates of the space, padded with zeros
   double radius_m = 0.0;
   bool inside_out = false;
 };
 
-// Any other object, at rest, in coordinates of the space.
+// Any other object, in its described place, in coordinates of the space.
 struct Solid {
   std::int32_t object = 0;
-  std::vector<Part> parts;  // none if the space doesn't meet it
+  std::vector<Part> parts;  // empty if the space doesn't meet it
 };
 
 template <int N>
 struct Cut {
-  std::vector<HalfSpace<N>> planes;  // flat, rigid and still, faces of boxes from inside among them
-  std::vector<Ball> balls;           // rigid and still spheres, with N < 3 only
+  std::vector<HalfSpace<N>> planes;  // flat, rigid and at rest, including faces of boxes seen from inside
+  std::vector<Ball> balls;           // rigid spheres at rest; only with N < 3
   std::vector<Solid> solids;
   std::vector<std::int32_t> missed;                           // objects that the space doesn't meet
-  std::vector<std::pair<std::int32_t, std::int32_t>> joined;  // pairs of objects that hold as one (seams.hpp)
+  std::vector<std::pair<std::int32_t, std::int32_t>> joined;  // pairs of flush objects (seams.hpp)
 };
 
-// The mesh that is all there is, still and without a layer; nullptr for any other scene. In three dimensions it needs
-// no obstacle around it, and no solid is made of it.
+// The only object of a scene, if it is a mesh at rest without a layer; else nullptr. In three dimensions such a mesh is
+// rendered directly, without an obstacle or a Solid.
 const MeshShape* lone_mesh(const Scene& scene);
 
-// Throws SetupError for what can't be cut; see section.hpp.
+// Throws SetupError if an object can't be cut; see section.hpp.
 template <int N>
 Cut<N> cut_by_space(const Scene& scene);
 extern template Cut<1> cut_by_space<1>(const Scene&);

@@ -1,10 +1,11 @@
-// The elastic layers that a proxy can press on at once, as springs: for the stability of what is felt there.
+// The elastic layers that a proxy can press at the same time, as springs, to judge stability in contact with them.
 //
-// A flat face has its normal. On a sphere, or on what else is round, the normal can point anywhere: seven lines stand
-// for all, the cube's edges and diagonals. The round side of a cylinder is judged so, too, and so is what turns.
+// A flat face has its normal. On a sphere or another round shape the normal can have any direction: seven lines
+// represent all, the edges and diagonals of a cube. The same holds for the round side of a cylinder, and for turning
+// objects.
 //
-// Layers press together where their solids overlap: two or three flat faces with a normal each. Something round beside
-// another layer is taken to press along the same line: the stiffest that the two can be.
+// Layers press together if their solids overlap: two or three flat faces, each with its normal. A round shape beside
+// another layer is assumed to press along the same line, which is the stiffest combination.
 #pragma once
 
 #include <string>
@@ -15,7 +16,7 @@
 
 namespace proxarm::scenes {
 
-// A layer where it is pressed on.
+// A layer at a place where it is pressed.
 struct PressedLayer {
   std::string object;  // its name
   double stiffness_N_per_m = 0.0;
@@ -26,8 +27,8 @@ struct PressedLayer {
 // One layer, or several that press at once.
 using LayersTogether = std::vector<PressedLayer>;
 
-// All of a scene, single ones first. At most `most`: where a scene has more, the stiffest. Directions out of the
-// scene's space are left out.
+// All touches of a scene, single layers first. At most `most`, the stiffest ones. Directions out of the scene's space
+// are left out.
 inline constexpr std::size_t most_touches = 48;
 std::vector<LayersTogether> layer_touches(const Scene& scene, std::size_t most = most_touches);
 

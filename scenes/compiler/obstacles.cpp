@@ -115,7 +115,7 @@ struct Size {
   double operator()(const MeshShape& s) const { return 0.5 * (s.mesh->bounds().high - s.mesh->bounds().low).norm(); }
 };
 
-// The shape that is left of an object from inside when its layer is used up: its walls stand back by the thickness.
+// The cavity that remains when an inside-out object's layer is fully compressed: its walls recede by the thickness.
 struct StandBack {
   double by_m;
 
@@ -142,7 +142,7 @@ struct StandBack {
   Shape operator()(MeshShape s) const { return s; }
 };
 
-// How thick the solid under a layer is; 0 if the shape can't have a layer.
+// Thickness of the solid under a layer; 0 if the shape can't have a layer.
 struct Thickness {
   static constexpr double kEndless = std::numeric_limits<double>::infinity();
 
@@ -180,7 +180,7 @@ Layer layer_on(const Scene& scene, const Object& object, double thickness_m, con
 }
 
 std::vector<Part> parts_of(const Scene& scene, const Object& object) {
-  // The sides of a mesh's faces are exact; within a layer they would not be.
+  // A mesh's faces are exact on both sides; a layer would make them inexact.
   const double thickness = std::visit(Thickness{}, object.shape);
   const Layer layer =
       layer_on(scene, object, thickness,

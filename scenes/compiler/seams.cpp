@@ -15,9 +15,9 @@ using models::Mat3;
 using models::Pose;
 using models::Vec3;
 
-// How far a bridge reaches into either solid, and past its ends where the solids go on there.
+// How far a bridge reaches into either solid, and beyond its ends if the solids continue there.
 constexpr double reach_m = 1e-3;
-// Sizes in decimals aren't exact: a gap of 1 µm reads as a little more.
+// Decimal sizes aren't exact: a gap of 1 µm may be stored as slightly more.
 constexpr double within_m = joined_m * (1.0 + 1e-6);
 
 bool joins(const Object& object) {
@@ -26,7 +26,7 @@ bool joins(const Object& object) {
          std::holds_alternative<PlaneShape>(object.shape);
 }
 
-// The axes of b that are those of a, as columns of a signed permutation; none if they aren't parallel.
+// The axes of b expressed in a, as a signed permutation; nullopt if they aren't parallel.
 std::optional<Mat3> turned_alike(const BoxShape& a, const BoxShape& b) {
   const Mat3 R = a.pose_W.linear().transpose() * b.pose_W.linear();
   const Mat3 P = R.array().round();
@@ -35,7 +35,7 @@ std::optional<Mat3> turned_alike(const BoxShape& a, const BoxShape& b) {
   return P;
 }
 
-// A box in the frame of another one that it is turned alike with.
+// A box in the frame of another box with parallel edges.
 struct Extent {
   Vec3 low, high;
 };
@@ -55,7 +55,7 @@ BoxShape as_box(const Pose& frame, const Extent& extent) {
   return box;
 }
 
-// The axis along which faces of the two lie upon one another, whose other extents overlap.
+// The axis along which faces of the two are in contact, if their other extents overlap.
 std::optional<int> shared_axis(const Extent& a, const Extent& b) {
   for (int k = 0; k < 3; ++k) {
     const bool touch = std::abs(a.high[k] - b.low[k]) <= within_m || std::abs(b.high[k] - a.low[k]) <= within_m;
@@ -78,7 +78,7 @@ class Joiner {
   }
 
   Joined join() {
-    // A face that is put out may meet a third one, which meets a fourth: as often as there are solids at most.
+    // A moved face may meet a third one, which meets a fourth: at most as many rounds as solids.
     for (std::size_t round = 0; round < solids_.size() && level_all(); ++round) {
     }
     for_pairs([this](std::size_t i, std::size_t j) { bridge(i, j); });
@@ -101,7 +101,7 @@ class Joiner {
               [this](std::size_t a, std::size_t b) { return bounds_[a].first < bounds_[b].first; });
   }
 
-  // All pairs of solids whose bounds meet along x and that may hold as one.
+  // Visits all pairs of solids whose bounds overlap along x.
   template <typename Visit>
   void for_pairs(const Visit& visit) {
     for (std::size_t k = 0; k < solids_.size(); ++k) {
@@ -113,7 +113,7 @@ class Joiner {
     }
   }
 
-  // Takes out the steps of less than joined_m. True if there were any.
+  // Removes steps of less than joined_m. True if there were any.
   bool level_all() {
     bool changed = false;
     for_pairs([&](std::size_t i, std::size_t j) {
@@ -138,7 +138,7 @@ class Joiner {
     if (!axis) return false;
     bool steps = (a.pose_W.linear() * *P - b.pose_W.linear()).norm() > 0.0;
     bool a_grows = false;
-    // Below this, places differ by rounding alone.
+    // Smaller differences are rounding.
     const double rounding = 1e-15 * (a.pose_W.translation().norm() + b.pose_W.translation().norm() + of_b.high.norm());
     const auto put = [&](double& one, double& other, double outer) {
       if (std::abs(one - other) > within_m || std::abs(one - other) <= rounding) return;
@@ -157,7 +157,7 @@ class Joiner {
     return true;
   }
 
-  // Whether an end of one lies upon an end of the other, on one axis.
+  // True if the cylinders are coaxial and an end of one touches an end of the other.
   static bool ends_on(const CylinderShape& a, const CylinderShape& b) {
     const Vec3 e = (a.to_m - a.from_m).normalized();
     const auto off_axis_m = [&](const Vec3& x) { return (x - a.from_m - e * e.dot(x - a.from_m)).norm(); };
@@ -193,7 +193,7 @@ class Joiner {
     add(i, j, as_box(a.pose_W, shared));
   }
 
-  // A box that stands on a plane.
+  // Bridges a box and the plane it stands on.
   void bridge_box_to_plane(std::size_t i, std::size_t plane, const Vec3& n, const Vec3& point) {
     const BoxShape& box = std::get<BoxShape>(objects_[i].shape);
     const Vec3 n_box = box.pose_W.linear().transpose() * n;
@@ -227,7 +227,7 @@ class Joiner {
     return {std::pair{c.from_m, c.to_m}, std::pair{c.to_m, c.from_m}};
   }
 
-  // An end of a cylinder that lies within a box's face or the end of another cylinder that is as thick or thicker.
+  // Bridges a cylinder's end and a box's face or another cylinder's end that contains it.
   void bridge_end(std::size_t i, std::size_t other) {
     const CylinderShape& cylinder = std::get<CylinderShape>(objects_[i].shape);
     for (const auto& [end, far_end] : ends(cylinder)) {
@@ -266,7 +266,7 @@ class Joiner {
     add(i, with, disc);
   }
 
-  // Past its ends, where the solids beside it go on: bridges that meet at a corner are to overlap.
+  // Extends a bridge beyond its ends where the solids continue, so that bridges meeting at a corner overlap.
   void lengthen(const Pose& frame, int across, double reach, Extent& bridge) const {
     for (const int k : {(across + 1) % 3, (across + 2) % 3}) {
       for (const bool high : {true, false}) {
@@ -279,8 +279,8 @@ class Joiner {
     }
   }
 
-  // Whether its corners and the middles between them, a little inwards, are within solids; `across` the seam only the
-  // quarters are looked at, for a gap between the two.
+  // True if the box's corners and the points between them, slightly inwards, are within solids. `across` the seam it
+  // skips the middle, where a gap may be.
   [[nodiscard]] bool solid_throughout(const Pose& frame, int across, const Extent& extent) const {
     const Vec3 middle = 0.5 * (extent.low + extent.high), half = 0.5 * (extent.high - extent.low);
     for (int corner = 0; corner < 27; ++corner) {
@@ -307,7 +307,7 @@ class Joiner {
   }
 
   std::vector<Object> objects_;
-  std::vector<std::size_t> solids_, planes_;       // indices; the solids along x
+  std::vector<std::size_t> solids_, planes_;       // indices; solids sorted along x
   std::vector<std::pair<double, double>> bounds_;  // of each solid along x
   std::vector<Seam> seams_;
 };

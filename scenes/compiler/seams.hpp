@@ -1,18 +1,18 @@
-// Solids that stand flush hold as one.
+// Lets flush solids act as one, by bridging the seams between them.
 //
-// A point that slides from one box over to the next comes to the place where both end. There the first lets it go
-// around its edge, and the second stops it with the side that the first hides: it would fall in between. So would a
-// point that is pushed along a table against the foot of a box: it would pass below. Each pair of flat faces that lie
-// upon one another is a seam, and is closed by a small solid of the size of what they share, which reaches from one
-// into the other and ends where they end. Nothing else changes: it is within the two, but for a gap between them.
+// Without bridges, a point that slides from one box to the next could fall in between. At the common edge, the first
+// box lets it go around its edge, and the second box stops it only with a side that the first hides. Likewise, a point
+// pushed along a table against the foot of a box would pass below the box. So each seam, a pair of flat faces in
+// contact, gets a small solid with the extent of their common area. It reaches from one solid into the other and ends
+// where they end. It lies within both, except for a gap between them, so nothing else changes.
 //
-// Faces lie upon one another if they are less than joined_m apart. Where other faces of such a pair are nearly in one
-// plane, a step of less than joined_m, they are put into the outer one: no step is small enough for a point to get
-// over. Boxes that are turned against each other by less than joined_m at their corners are turned alike.
+// Faces are in contact if they are less than joined_m apart. If other faces of such a pair are nearly in one plane,
+// with a step of less than joined_m, they are moved to the outer one: a point can't pass even the smallest step. Boxes
+// turned against each other by less than joined_m at their corners are aligned.
 //
-// Joined are boxes, the ends of cylinders, and planes: boxes whose edges are parallel, a box on a plane, cylinders on
-// one axis, and a cylinder's end that lies within a box's face, another cylinder's end or a plane. All stand still, are
-// solid and rigid: two layers that overlap would push twice as hard.
+// Joined are boxes with parallel edges, a box on a plane, coaxial cylinders, and a cylinder's end within a box's face,
+// another cylinder's end or a plane. All must be at rest, solid and rigid: two overlapping layers would push twice as
+// hard.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@
 
 namespace proxarm::scenes {
 
-// The largest gap or step between faces that hold as one, metres.
+// Largest gap or step between flush faces, metres.
 inline constexpr double joined_m = 1e-6;
 
 struct Seam {
@@ -31,7 +31,7 @@ struct Seam {
 };
 
 struct Joined {
-  std::vector<Object> objects;  // those of the scene, in order, with their steps taken out
+  std::vector<Object> objects;  // the scene's objects in order, with steps removed
   std::vector<Seam> seams;
 };
 

@@ -22,13 +22,12 @@ using models::Pose;
 using models::Vec3;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// Up to this angle (rad), two directions that are given in round numbers count as parallel or as perpendicular. A
-// space's own axes must be perpendicular to the same accuracy. Six digits are what people write; a larger value would
-// hide errors that a proxy could feel.
+// Up to this angle (rad), two directions count as parallel or perpendicular. A space's axes must be perpendicular to
+// the same accuracy. Users write up to six digits; a larger value would hide errors that can be felt.
 constexpr double straight = 1e-6;
 
-// Up to this distance from the space, metres, a guide's point counts as lying in it. An arm knows its place to about as
-// much.
+// Up to this distance from the space, metres, a guide's point counts as lying in it. An arm's accuracy is about as
+// large.
 constexpr double beside_m = 1e-6;
 
 std::string in_dimensions(const Scene& scene) {
@@ -139,7 +138,7 @@ class Section {
   std::vector<Part> operator()(const CapsuleShape& s) const {
     const models::SegmentCore core(s.from_m, s.to_m);
     if (line()) {
-      // A capsule is convex, so its interval reaches from the least to the greatest t of its cylinder and its two
+      // A capsule is convex, so its interval reaches from the smallest to the largest t of its cylinder and its two
       // balls.
       const Vec3 u = origin() - s.from_m, d = axis(0);
       Interval held = within_radius(u - core.e * core.e.dot(u), d - core.e * core.e.dot(d), s.radius_m);
@@ -184,7 +183,7 @@ class Section {
   [[nodiscard]] bool line() const noexcept { return scene_.space.dimensions == 1; }
   [[nodiscard]] const Vec3& origin() const noexcept { return scene_.space.origin_m; }
   [[nodiscard]] Vec3 axis(Eigen::Index k) const noexcept { return scene_.space.axes.col(k); }
-  // All three coordinates of a point of W, including those across the space.
+  // Coordinates of a point of W, including those across the space.
   [[nodiscard]] Vec3 coordinates(const Vec3& x_W) const noexcept {
     const Vec3 d = x_W - origin();
     return {axis(0).dot(d), axis(1).dot(d), axis(2).dot(d)};
@@ -214,8 +213,8 @@ class Section {
             : "a layer on what is no mesh and, if it is solid, has its axes in the space or across it");
   }
 
-  // The section by a space that doesn't meet the solid: empty. Throws for a cavity, which leaves the proxy no room
-  // then.
+  // Section by a space that doesn't meet the solid: empty. Throws for a cavity, in which the proxy would have no free
+  // place.
   [[nodiscard]] std::vector<Part> outside(bool inside_out) const {
     if (inside_out)
       throw error("the proxy's space lies inside the object " + object_.name, "move `space` or the object");
@@ -243,7 +242,7 @@ class Section {
     return block(in_space(centre_W), R, {along, across}, inside_out);
   }
 
-  // A box that is so deep across the space that no way enters or leaves it there.
+  // A box so deep across the space that the proxy meets only its sides.
   [[nodiscard]] std::vector<Part> block(const Vec3& centre, const models::Mat3& R, const std::vector<double>& half,
                                         bool inside_out) const {
     Pose pose = Pose::Identity();
@@ -264,7 +263,7 @@ class Section {
     return parts;
   }
 
-  // A box from inside: its faces that meet the space.
+  // The faces of a box seen from inside that meet the space.
   [[nodiscard]] std::vector<Part> room(const BoxShape& s) const {
     std::vector<Part> parts;
     std::int32_t feature = 0;
@@ -278,7 +277,7 @@ class Section {
     return parts;
   }
 
-  // A box that is cut askew: walls on three to six segments.
+  // An oblique cut of a box: walls on three to six segments.
   [[nodiscard]] std::vector<Part> polygon(const BoxShape& s) const {
     models::TriangleSoup walls;
     const auto corner = [&](int axis, double first, double second, double third) {
@@ -299,7 +298,7 @@ class Section {
     return standing(std::move(walls), {});
   }
 
-  // Friction of walls by the ends of their segments, the lesser end first.
+  // Friction of walls by the ends of their segments, smaller end first.
   using FrictionOfWalls = std::map<std::array<double, 4>, double>;
   static std::array<double, 4> ends_of(const Vec3& a, const Vec3& b) {
     const bool in_order = a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
@@ -312,14 +311,14 @@ class Section {
     const auto mesh = std::make_shared<const models::TriangleMesh>(std::move(walls));
     std::vector<double> by_face;
     for (std::uint32_t face = 0; face < mesh->size() && !friction.empty() && !line(); ++face) {
-      // Two of the triangle's corners are one above the other; the third is at the other end of the segment.
+      // Two corners of the triangle lie above each other; the third is at the segment's other end.
       const Vec3 &a = mesh->corner(face, 0), &b = mesh->corner(face, 1), &c = mesh->corner(face, 2);
       by_face.push_back(friction.at(ends_of(a, a.head<2>() == b.head<2>() ? c : b)));
     }
     return one(std::make_unique<models::MeshObstacle>(mesh, mu_, std::move(by_face)));
   }
 
-  // An upright rectangle over the segment from a to b.
+  // Adds a rectangle over the segment from a to b.
   static void add_wall(const Vec3& a, const Vec3& b, const Vec3& up, models::TriangleSoup& walls) {
     if (a == b) return;
     const auto first = static_cast<std::uint32_t>(walls.vertices.size());
@@ -328,9 +327,8 @@ class Section {
     walls.triangles.push_back({first, first + 2, first + 3});
   }
 
-  // The segment in which z = 0 cuts a triangle or a rectangle. A corner at z = 0 counts as above. The point at which a
-  // side is cut doesn't depend on which of the two faces at that side is asked, so that neighbouring walls meet
-  // exactly.
+  // Adds the segment in which z = 0 cuts a triangle or a rectangle. A corner at z = 0 counts as above. Both faces at an
+  // edge give the same cut point, so that neighbouring walls meet exactly.
   static void add_segment(std::span<const Vec3> x, double deep, models::TriangleSoup& walls) {
     std::array<Vec3, 2> ends;
     std::size_t count = 0;
@@ -344,7 +342,7 @@ class Section {
     if (count == 2) add_wall(ends[0], ends[1], Vec3(0, 0, deep), walls);
   }
 
-  // The point at which the x axis passes through the triangle, by barycentric coordinates.
+  // Adds the point at which the x axis passes through the triangle, by barycentric coordinates.
   static void add_point(const std::array<Vec3, 3>& x, double deep, models::TriangleSoup& walls) {
     const auto area = [](const Vec3& a, const Vec3& b) { return a.y() * b.z() - a.z() * b.y(); };
     const std::array<double, 3> w{area(x[1], x[2]), area(x[2], x[0]), area(x[0], x[1])};
@@ -375,7 +373,7 @@ std::optional<PlaneShape> plane_in_space(const Scene& scene, const Object& objec
   double rest = 0.0;
   const Vec3 m = along(space, n, rest);
   const double height = n.dot(space.origin_m + space.axes * near - plane.point_m);
-  // A space that is parallel to the plane within the rounding of both doesn't meet it, or lies in it.
+  // A space parallel to the plane, within rounding, either doesn't meet it or lies in it.
   if (m.norm() < 1e-12) {
     if (!(height < 0.0)) return std::nullopt;
     throw refusal(scene, object.line, "the proxy's space lies inside the object " + object.name,

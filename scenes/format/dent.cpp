@@ -20,8 +20,8 @@ const Solid::Face& nearest(const Solid& hull, const Vec3& x) {
                            [&](const Solid::Face& a, const Solid::Face& b) { return below(a, x) < below(b, x); });
 }
 
-// The depth is the least of linear functions of the place. So over a triangle it is at most what any one of them is at
-// a corner; here the one that is least in the middle.
+// The depth is the minimum of linear functions of the position, one per face. Over a triangle it is at most the largest
+// value of any one of them at the corners; this uses the one that is smallest at the centre.
 struct Depth {
   double there, at_most;
 };
@@ -40,7 +40,7 @@ std::array<Triangle, 4> quarters(const Triangle& at) {
 
 double deepest_dent_m(const models::TriangleMesh& mesh, const Solid& hull) {
   constexpr double precision = 1.01;
-  const double rounding_m = 1e-9 * hull.reach;  // of faces that are nearly in one plane, too
+  const double rounding_m = 1e-9 * hull.reach;  // including that of faces nearly in one plane
   double deepest_m = 0.0;
   std::vector<Triangle> left;
   for (std::uint32_t face = 0; face < mesh.size(); ++face) {

@@ -20,13 +20,13 @@ using description::between;
 using description::YamlNode;
 using models::Vec3;
 
-// Coordinates beyond a hundred kilometres are a mistake of the unit, and their rounding (1e-11 m) would cost the proxy
-// its exactness.
+// Coordinates beyond a hundred kilometres are a mistake of the unit, and their rounding (1e-11 m) would make the proxy
+// inexact.
 constexpr description::Range coordinate_range = between(-1e5, 1e5);
 constexpr description::Range friction_range = between(0.0, 100.0);
 // A length below a nanometre is a mistake of the unit; an arm knows its position to micrometres.
 constexpr description::Range length_range = between(1e-9, 1e5);
-// Corners ten centimetres apart are never one.
+// Corners ten centimetres apart are never the same corner.
 constexpr description::Range weld_range = between(0.0, 0.1);
 constexpr description::Range speed_range = between(-100.0, 100.0);
 
@@ -50,7 +50,7 @@ models::Pose pose_of(const YamlNode& node) {
   pose.translation() = vector_of(node.vec3_or("position_m", {0, 0, 0}, coordinate_range));
   const Vec3 rpy =
       vector_of(node.vec3_or("rpy_rad", {0, 0, 0}, between(-2.0 * std::numbers::pi, 2.0 * std::numbers::pi)));
-  if (rpy.isZero(0.0)) return pose;  // without a rotation, coordinates stay as they are bit for bit
+  if (rpy.isZero(0.0)) return pose;  // without a rotation, coordinates stay unchanged to the bit
   pose.linear() = (Eigen::AngleAxisd(rpy.z(), Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vec3::UnitY()) *
                    Eigen::AngleAxisd(rpy.x(), Vec3::UnitX()))
                       .toRotationMatrix();
@@ -148,7 +148,7 @@ Motion read_motion(const YamlNode& node) {
   return motion;
 }
 
-// The shape of a region; a mesh can't be one.
+// The shape of a region; no mesh.
 Shape read_region(const YamlNode& within) {
   if (within.is_map()) refuse_key(within, "mesh", "a box, sphere, capsule, cylinder or plane as a region", "a mesh");
   std::vector<std::string> solid = kinds();
@@ -207,7 +207,7 @@ Space read_space(const YamlNode& root) {
     space.axes.col(i) = axis.normalized();
   }
   if (space.dimensions < 3) {
-    // The remaining axes only complete the rotation, which drawings and sections use.
+    // The remaining axes only complete the rotation, for drawings and sections.
     const Vec3 x = space.axes.col(0);
     if (space.dimensions == 1) space.axes.col(1) = x.unitOrthogonal();
     space.axes.col(2) = x.cross(Vec3(space.axes.col(1)));

@@ -21,7 +21,7 @@ using description::between;
 using description::YamlNode;
 using models::Vec3;
 
-// A tool of more than ten metres is a mistake of the unit, and so is one below a micrometre.
+// A tool larger than ten metres or smaller than a micrometre is a mistake of the unit.
 constexpr description::Range size_range = between(1e-6, 10.0);
 constexpr description::Range friction_range = between(0.0, 100.0);
 constexpr description::Range weld_range = between(0.0, 0.1);
@@ -40,8 +40,8 @@ models::Pose pose_of(const YamlNode& node) {
   return pose;
 }
 
-// How far a vertex stands out over a face of a mesh that should be convex, whichever side its normal is on. (No depth:
-// over a slanting face in a dent of 5 mm something may stand out by more.)
+// Largest distance of a vertex over a face of a mesh that should be convex, whichever way its normal points. (Not a
+// depth: over a slanted face in a dent of 5 mm, a vertex may stand out by more.)
 double stands_out_m(const models::TriangleMesh& mesh, const std::vector<Vec3>& points) {
   double deepest = 0.0;
   for (std::uint32_t face = 0; face < mesh.size(); ++face) {
@@ -79,8 +79,8 @@ models::ConvexTool read_convex(const YamlNode& node, RigidTool& tool) {
     convex.points_m.push_back(mesh->vertex(vertex));
     size_m = std::max(size_m, convex.points_m.back().norm());
   }
-  // Coordinates in files are rounded to 6e-8 of their size, and the plane of a slim triangle turns by some hundred
-  // times that.
+  // File coordinates are rounded to 6e-8 of their size, and the plane of a slim triangle turns by some hundred times
+  // that.
   constexpr double roundness = 1e-5;
   if (!hull && stands_out_m(*mesh, convex.points_m) > roundness * size_m) {
     const double dent_m = deepest_dent_m(*mesh, models::solid_of(convex, models::Pose::Identity()));
@@ -125,7 +125,6 @@ models::ToolPart read_part(const std::string& kind, const YamlNode& node, RigidT
   return part;
 }
 
-// Of one shape, or of several under `parts`.
 void read_parts(const YamlNode& node, RigidTool& tool) {
   const std::vector<std::string>& kinds = tool_kinds();
   std::vector<std::string> keys = kinds;

@@ -1,5 +1,5 @@
-// The tool that an arm holds, as a file states it: shapes that are fixed to each other, in the tool's frame T, whose
-// origin is the rendered point. docs/tool.md has the keys.
+// The tool that the arm holds, as in its file: shapes fixed to each other, in the tool's frame T, whose origin is the
+// rendered point. docs/tool.md describes the keys.
 #pragma once
 
 #include <filesystem>
@@ -15,18 +15,18 @@ class YamlNode;
 namespace proxarm::scenes {
 
 struct RigidTool {
-  std::filesystem::path file;  // that it was read from, for messages
+  std::filesystem::path file;  // for messages
   int line = 0;
   std::string name;
-  models::Tool shape;                         // one part or more
-  std::vector<std::filesystem::path> meshes;  // that it is made of, or whose vertices span a hull
+  models::Tool shape;                         // at least one part
+  std::vector<std::filesystem::path> meshes;  // files of its meshes, also of those used for hulls
 };
 
-// Of a file of its own, or of a scene's key `tool`. Throw description::SetupError with file, line and key.
+// From a tool file, or from a scene's key `tool`. Throws description::SetupError with file, line and key.
 RigidTool load_tool(const std::filesystem::path& file);
 RigidTool read_tool(const description::YamlNode& node);
 
-// The keys of a tool's shapes; several shapes stand under `parts`.
+// Keys for a tool's shape; several shapes are listed under `parts`.
 const std::vector<std::string>& tool_kinds();
 
 }  // namespace proxarm::scenes

@@ -1,5 +1,6 @@
-// The three formats: bytes in, triangles and what became of each face out. Throw std::runtime_error with what is wrong
-// and where. Files are untrusted: call these in a sandbox (sandbox.hpp), which bounds time and memory.
+// Parsers of the three mesh formats: from bytes to triangles, with a count of how each face was used. They throw
+// std::runtime_error with problem and place. Files are untrusted: call these in a sandbox (sandbox.hpp), which limits
+// time and memory.
 #pragma once
 
 #include <string_view>
@@ -8,8 +9,8 @@
 
 namespace proxarm::scenes {
 
-// STL, binary or text (3D Systems, Stereolithography Interface Specification, 1989). Binary is what has the length that
-// the count in its header asks for, whether it begins with "solid" or not.
+// STL, binary or text (3D Systems, Stereolithography Interface Specification, 1989). A file is binary if its length
+// matches the count in its header, even if it begins with "solid".
 ParsedMesh parse_stl(std::string_view bytes);
 
 // OBJ (Alias|Wavefront, Object Files, version 3.0): vertices and polygons. Free-form curves and surfaces are refused.

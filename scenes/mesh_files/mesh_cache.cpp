@@ -25,7 +25,7 @@ using models::TriangleMesh;
 using Bytes = std::span<const std::byte>;
 using Digest = Sha256::Digest;
 
-// Smallest mesh file that gets a cache, bytes: about 20,000 triangles. A smaller one loads in no time without a cache.
+// Smallest mesh file with a cache, bytes: about 20,000 triangles. Smaller files load quickly without one.
 constexpr std::uintmax_t kSmallest = 1'000'000;
 
 struct Header {
@@ -100,12 +100,12 @@ bool write(const Descriptor& out, Bytes bytes) {
   return true;
 }
 
-// Creates a new file. An existing file of that name, or a link to somewhere else, is left alone, and creation fails.
+// Creates a new file. Fails if the name exists, also as a link; the existing file isn't touched.
 Descriptor create(const std::string& file, ::mode_t mode) {
   return Descriptor(::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
 }
 
-// This user's secret, which is made if there is none. nullopt if it can't be stored, or if others may know it.
+// This user's secret, created if missing. nullopt if it can't be stored, or if others could read it.
 std::optional<Digest> secret() {
   const auto folder = cache_folder();
   if (!folder) return std::nullopt;
@@ -199,7 +199,7 @@ void MeshCache::store(const CachedMesh& mesh) const {
   header.account = mesh.account;
   const auto signed_as = signature(header, structure, secret_);
   if (!signed_as) return;
-  // The cache appears whole or not at all: it is written beside its place and then renamed.
+  // Write beside the final place, then rename: the cache appears complete or not at all.
   const std::string beside = file_.string() + "." + std::to_string(::getpid());
   const Descriptor out = create(beside, 0644);
   if (out.get() < 0) return;

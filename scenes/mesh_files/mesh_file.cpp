@@ -29,12 +29,12 @@ using models::TriangleMesh;
 using models::TriangleSoup;
 using models::Vec3;
 
-// Some five million triangles of a binary STL. The reader's limits of time and memory grow with the file.
+// Some five million triangles of a binary STL. The parser's limits of time and memory grow with the file.
 constexpr std::uintmax_t most_bytes = std::uintmax_t{256} << 20;
 
 constexpr const char* kExpected = "a mesh: STL, OBJ or PLY, with triangles";
 
-// The size of a file that is one, and of a size that may be read: a pipe would wait for ever.
+// Size of a regular file that isn't too large. Refuses a pipe, on which reading could block without end.
 std::uintmax_t checked_size(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) {
@@ -58,8 +58,8 @@ std::string contents_of(const std::filesystem::path& file) {
   return bytes;
 }
 
-// A file's extension decides on its format. Damaged files can keep a reader busy for long, so this runs in a sandbox.
-// Throws std::runtime_error with what was found.
+// The file's extension selects the format. Damaged files can keep a parser busy for long, so this runs in a sandbox.
+// Throws std::runtime_error with the problem.
 ParsedMesh parse(const std::filesystem::path& file, const std::string& extension) {
   const std::string bytes = contents_of(file);
   if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff")) {
@@ -69,7 +69,7 @@ ParsedMesh parse(const std::filesystem::path& file, const std::string& extension
   return extension == ".obj" ? parse_obj(bytes) : parse_ply(bytes);
 }
 
-// What was parsed as bytes, to pass it out of the sandbox.
+// The parsed mesh as bytes, to pass it out of the sandbox.
 struct Counts {
   FaceAccount account;
   double last_digit = 0.0;
@@ -111,7 +111,7 @@ ParsedMesh mesh_of(const std::vector<std::byte>& bytes) {
   return mesh;
 }
 
-// From the file's unit to W.
+// Transforms from the file's unit and frame to W.
 void place(TriangleSoup& soup, const MeshPlacement& placement) {
   using Anchor = MeshPlacement::Anchor;
   models::Pose pose = placement.pose_W;
@@ -138,8 +138,7 @@ double weld_of(const ParsedMesh& mesh) {
   return models::default_weld(largest, mesh.last_digit);
 }
 
-// With faces that are there more than once left out, and borders welded where it isn't closed. The mesh given if there
-// is nothing to be done.
+// Drops duplicate faces and, if the mesh isn't closed, welds its borders. Returns the given mesh if nothing changes.
 std::shared_ptr<const TriangleMesh> repaired(std::shared_ptr<const TriangleMesh> mesh, double weld_m,
                                              FaceAccount& account) {
   TriangleSoup soup{mesh->structure().vertices, mesh->structure().triangles};
@@ -174,7 +173,7 @@ ParsedMesh parse_mesh_file(const std::filesystem::path& file) {
                       .found = extension.empty() ? "a file without an extension" : in_quotes(extension),
                       .expected = "a mesh: .stl, .obj or .ply"});
   }
-  // Ten times the time and the memory that STL, OBJ and PLY files of this size take.
+  // Ten times the time and memory that STL, OBJ and PLY files of this size need.
   const double megabytes = 1e-6 * static_cast<double>(checked_size(file));
   const SandboxLimits limits{.seconds = 2.0 + megabytes,
                              .memory = 1'000'000'000 + static_cast<std::size_t>(60e6 * megabytes)};

@@ -1,4 +1,4 @@
-// What there is to say of a mesh that was read: for `proxarm check`, everything; before a session, what would surprise.
+// Describes a loaded mesh: completely for `proxarm check`; before a session, only what may surprise the user.
 #pragma once
 
 #include <string>
@@ -8,23 +8,23 @@
 
 namespace proxarm::scenes {
 
-// All of it, a line each: faces, size, holes with places and sizes, edges and faces that are wrong, a guess of the
-// unit. Takes as long as loading the mesh.
+// One line each: faces, size, holes with places and sizes, wrong edges and faces, a guess of the unit. Takes as long as
+// loading the mesh.
 std::vector<std::string> mesh_report(const LoadedMesh& mesh);
 
-// Where it lies: "200 mm × 100 mm × 50 mm, from x 0, y 0, z 0 m to x 0.2, y 0.1, z 0.05 m".
+// Size and place: "200 mm × 100 mm × 50 mm, from x 0, y 0, z 0 m to x 0.2, y 0.1, z 0.05 m".
 std::string box_text(const models::TriangleMesh& mesh);
 
-// Of a mesh of 200 m and more, or of 0.2 mm and less: the scale_m that is probably meant. What an arm of some metres
-// touches is in between; `run` and `check` of a cell hold meshes against the arm's own reach (mesh_surprises()).
+// For a mesh of 200 m or more, or 0.2 mm or less: the scale_m that is probably meant. Objects for an arm of some metres
+// are in between. With a cell, `run` and `check` compare meshes with the arm's reach (mesh_surprises()).
 std::vector<std::string> unit_hints(const models::TriangleMesh& mesh, double scale);
 
-// Whether it may be with a rigid tool (models/mesh/mesh_topology.hpp). A point tool takes any mesh.
+// True if the mesh may be used with a rigid tool (models/mesh/mesh_topology.hpp). A point tool takes any mesh.
 bool is_a_body(const LoadedMesh& mesh);
 
-// Of an open mesh: holes that are small against it, through which a proxy falls though they can hardly be seen. And a
-// mesh that is hundreds of times as large as what the arm reaches (or a thousandth of it), which is in another unit
-// than the scene takes it for. Empty for most meshes; of one that is closed it costs nothing.
+// Reports holes of an open mesh that are hardly visible although a proxy falls through. Also reports a mesh that is at
+// least 30 times as large as the arm's reach, or a 3000th of it, and so has another unit than in the scene. Empty for
+// most meshes; costs nothing for a closed one.
 std::vector<std::string> mesh_surprises(const models::TriangleMesh& mesh, double reach_m, double scale);
 
 }  // namespace proxarm::scenes

@@ -15,7 +15,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "binary STL is read as it is in memory");
 
-// Binary: 80 bytes of anything, the number of triangles (u32), then 50 bytes for each.
+// Binary: 80 arbitrary bytes, the number of triangles (u32), then 50 bytes for each.
 constexpr std::size_t head_bytes = 84, facet_bytes = 50, normal_bytes = 12, vertex_bytes = 12;
 
 std::uint32_t count_in(std::string_view bytes) {
@@ -81,7 +81,7 @@ class TextStl {
   }
 
   void read_solid() {
-    // The name is the rest of the line, unless all is on one line.
+    // The name is the rest of the line, unless the whole solid is on one line.
     TextScanner ahead = text_;
     const std::string name = lower(ahead.rest_of_line());
     std::string word;
@@ -99,7 +99,7 @@ class TextStl {
 
   void read_facet() {
     expect("normal");
-    for (int k = 0; k < 3; ++k) (void)text_.word();  // whatever it is: the corners' order says the same
+    for (int k = 0; k < 3; ++k) (void)text_.word();  // ignored: the corners' order gives the normal
     expect("outer");
     expect("loop");
     corners_.clear();
@@ -133,7 +133,7 @@ ParsedMesh parse_stl(std::string_view bytes) {
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   TextScanner scanner(text.substr(0, 1000));
   if (sized || lower(scanner.word()) != "solid") return parse_binary(bytes);
-  // Binary files may begin with "solid", too, and be damaged: text has no zeros.
+  // A damaged binary file may also begin with "solid"; text has no zero bytes.
   if (text.find('\0') != std::string_view::npos) return parse_binary(bytes);
   return TextStl(text).parse();
 }

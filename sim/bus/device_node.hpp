@@ -1,5 +1,5 @@
-// A simulated device where it meets its bus: frames in, frames out at the moment they are ready, and faults of the
-// connection.
+// Connects a simulated device to its bus: delivers frames to it, sends its frames when they are ready, and simulates
+// faults of the connection.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,16 @@
 
 namespace proxarm::sim {
 
-// Called before a frame reaches a device, so that the physics has come to its time.
+// Called before a frame reaches a device, so that the physics is advanced to the frame's time.
 class Clockwork {
  public:
   virtual ~Clockwork() = default;
   virtual void advance_to(std::int64_t time_ns) noexcept = 0;
-  // The frame itself, before the device has it.
+  // The frame, before the device gets it.
   virtual void seen(const fieldbus::CanFrame& /*frame*/, std::int64_t /*time_ns*/) noexcept {}
 };
 
-// One node. The device is given later since it needs the node's port first.
+// One node. The device is set later, since it needs the node as its port.
 class DeviceNode final : public fieldbus::CanListener, public DevicePort {
  public:
   DeviceNode(std::string name, std::size_t bus, fieldbus::EventQueue& events, Clockwork& clockwork);
@@ -34,9 +34,9 @@ class DeviceNode final : public fieldbus::CanListener, public DevicePort {
   [[nodiscard]] std::uint64_t frames_sent() const noexcept { return frames_sent_; }
   [[nodiscard]] std::uint64_t frames_not_sent() const noexcept { return frames_not_sent_; }  // the port refused them
 
-  // Cut off: nothing passes in either direction. Several faults may want it at the same time.
+  // Disconnects the node in both directions. Counts, since several faults may cut it at the same time.
   void cut(bool cut) noexcept { cuts_ += cut ? 1 : -1; }
-  // Without power the device doesn't run either.
+  // Without power the device doesn't run.
   void set_power(bool on, std::int64_t time_ns) noexcept;
 
   void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
@@ -53,7 +53,7 @@ class DeviceNode final : public fieldbus::CanListener, public DevicePort {
   Clockwork& clockwork_;
   BusDevice* device_ = nullptr;
   fieldbus::CanPort* port_ = nullptr;
-  std::vector<fieldbus::CanFrame> waiting_;  // frames that aren't ready yet, in places that are used again
+  std::vector<fieldbus::CanFrame> waiting_;  // frames that aren't ready yet; the places are reused
   std::vector<std::uint32_t> free_places_;
   std::uint64_t frames_sent_ = 0, frames_not_sent_ = 0;
   int cuts_ = 0;

@@ -1,4 +1,4 @@
-// What a simulated device sees of its bus: something that carries frames away.
+// Interfaces between a simulated device and its bus.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,8 @@
 
 namespace proxarm::sim {
 
-// A device answers at a time of its own (its firmware needs a while), so every frame is handed over with the moment at
-// which it is ready to be sent. That moment may lie in the future; one in the past means now. Frames of one device that
-// are ready at the same time leave in the order of the calls.
+// Sends a device's frames. A device needs time to answer, so each frame has the time at which it is ready to be sent; a
+// time in the past means now. Frames of one device with the same time leave in the order of the calls.
 class DevicePort {
  public:
   DevicePort() = default;
@@ -20,7 +19,7 @@ class DevicePort {
   virtual void send(const fieldbus::CanFrame& frame, std::int64_t ready_ns) noexcept = 0;
 };
 
-// A device on a bus. Time only moves forward from one call to the next.
+// A device on a bus. The times of successive calls never decrease.
 class BusDevice {
  public:
   BusDevice() = default;
@@ -28,11 +27,11 @@ class BusDevice {
   BusDevice& operator=(const BusDevice&) = delete;
   virtual ~BusDevice() = default;
 
-  // The supply comes up: what the device was comes to an end, and it starts from its stored settings.
+  // Power comes on: the device restarts from its stored settings.
   virtual void power_on(std::int64_t time_ns) noexcept = 0;
-  // A frame that somebody else sent on the device's bus, complete at time_ns. Any bytes at all may come.
+  // A frame of another node, complete at time_ns. May contain any bytes.
   virtual void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept = 0;
-  // Time has come to time_ns: timers run out, periodic frames leave. Called at least once a millisecond.
+  // Runs timers and sends periodic frames. Called at least once a millisecond.
   virtual void on_time(std::int64_t time_ns) noexcept = 0;
 };
 

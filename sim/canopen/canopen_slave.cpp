@@ -9,7 +9,7 @@ namespace proxarm::sim {
 namespace {
 
 constexpr std::int64_t millisecond = 1'000'000;
-constexpr std::int64_t sdo_timeout = 1'000 * millisecond;  // a transfer that the client left lying is given up
+constexpr std::int64_t sdo_timeout = 1'000 * millisecond;  // ends a transfer that the client has abandoned
 
 fieldbus::CanFrame make_frame(std::uint32_t id, std::span<const std::uint8_t> bytes) noexcept {
   fieldbus::CanFrame frame;
@@ -37,11 +37,11 @@ void CanopenSlave::add_communication_objects() {
   ObjectDictionary& od = dictionary_;
   od.add(0x1000, 0, unsigned32, constant, config_.device_type);
   od.add(0x1001, 0, unsigned8, read_only, 0, true);
-  od.add(0x1003, 0, unsigned8, read_write, 0).maximum = 0;  // only 0 may be written: it clears the history
+  od.add(0x1003, 0, unsigned8, read_write, 0).maximum = 0;  // only 0 may be written, which clears the history
   for (std::uint8_t i = 1; i <= 8; ++i) od.add(0x1003, i, unsigned32, read_only, 0);
   sync_id_ = &od.add(0x1005, 0, unsigned32, read_write, 0x80);
   sync_id_->before_write = [](std::int64_t value) {
-    return (value & ~0x7FF) == 0 ? SdoAbort::none : SdoAbort::invalid_value;  // bit 30: doesn't generate SYNC
+    return (value & ~0x7FF) == 0 ? SdoAbort::none : SdoAbort::invalid_value;  // bit 30: it doesn't generate SYNC
   };
   od.add(0x1006, 0, unsigned32, read_write, 0);
   sync_window_ = &od.add(0x1007, 0, unsigned32, read_write, 0);
@@ -59,7 +59,7 @@ void CanopenSlave::add_communication_objects() {
   }
   od.add(0x1017, 0, unsigned16, read_write, 0).after_write = [this] {
     heartbeat_period_ns_ = dictionary_.number(0x1017) * millisecond;
-    heartbeat_ns_ = 0;  // the first one at once
+    heartbeat_ns_ = 0;  // send the first one at once
   };
   od.add(0x1018, 0, unsigned8, constant, 4);
   od.add(0x1018, 1, unsigned32, constant, config_.vendor);
@@ -114,7 +114,7 @@ void CanopenSlave::enter(NmtState to, std::int64_t time_ns) {
       receive->last_ns = never;
     }
   } else {
-    if (config_.stack == StackBehaviour::lazy) last_sync_ns_ = never;  // watched from the first one on
+    if (config_.stack == StackBehaviour::lazy) last_sync_ns_ = never;  // watched from the first SYNC on
     for (auto& transmit : transmit_) {
       transmit->last_ns = never;
       transmit->syncs = 0;
@@ -159,7 +159,7 @@ void CanopenSlave::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_n
   const bool is_guarded = frame.remote && !frame.extended && frame.id == 0x700u + config_.node;
   if (is_guarded && state_ != NmtState::initialising) return on_guard_request(time_ns);
   if (frame.extended || frame.remote || frame.error || frame.length > (frame.fd ? 64 : 8)) return;
-  if (frame.fd != (config_.fd && is_pdo(frame.id))) return;  // all services but PDOs stay with classic frames
+  if (frame.fd != (config_.fd && is_pdo(frame.id))) return;  // only PDOs use FD frames
   if (state_ == NmtState::initialising) return;
   if (frame.id == 0) return on_nmt_command(frame, time_ns);
   if (frame.id > 0x700 && frame.id <= 0x77F) {
@@ -221,13 +221,13 @@ void CanopenSlave::on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns
   if (state_ == NmtState::operational) transmit_on_sync(time_ns);
 }
 
-// A PDO that comes after the synchronous window (1007h) has closed is left out. One that is too short is refused; of
-// one that is too long, the first bytes count.
+// A PDO received after the synchronous window (1007h) is ignored. A PDO that is too short is refused; of one that is
+// too long, the first bytes count.
 void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
   if (frame.length < receive.pdo.length()) {
     return raise_error(emcy::pdo_too_short, error_register::communication, time_ns);
   }
-  // A CAN FD frame is filled up to the next length that there is.
+  // A CAN FD frame is padded to the next valid length.
   if (frame.length > fieldbus::padded_length(receive.pdo.length(), config_.fd)) {
     raise_error(emcy::pdo_too_long, error_register::communication, time_ns);
   } else {
@@ -235,7 +235,7 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
   }
   clear_error(emcy::pdo_too_short, time_ns);
   receive.last_ns = time_ns;
-  if (!latches()) clear_error(emcy::rpdo_timeout, time_ns);  // also one from before the PDO was configured anew
+  if (!latches()) clear_error(emcy::rpdo_timeout, time_ns);  // also an error from before the PDO was configured
   receive.overdue = false;
   const std::int64_t window_ns = sync_window_->number() * 1'000;
   if (!receive.pdo.synchronous()) return receive.pdo.unpack(frame.bytes());
@@ -245,7 +245,7 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
 }
 
 void CanopenSlave::on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
-  if (frame.length != 1 || frame.data[0] == 0) return;  // a boot-up isn't a heartbeat
+  if (frame.length != 1 || frame.data[0] == 0) return;  // a boot-up message is no heartbeat
   for (Consumer& consumer : consumers_) {
     if (consumer.limit_ns == 0 || consumer.node != node) continue;
     consumer.last_ns = time_ns;
@@ -302,7 +302,7 @@ void CanopenSlave::check_heartbeats(std::int64_t time_ns) {
   }
 }
 
-// Node guarding isn't for a node that produces heartbeats (CiA 301).
+// CiA 301: a node that produces heartbeats has no node guarding.
 void CanopenSlave::on_guard_request(std::int64_t time_ns) noexcept {
   if (heartbeat_period_ns_ > 0) return;
   last_guard_ns_ = time_ns;
@@ -322,7 +322,7 @@ void CanopenSlave::check_life_guarding(std::int64_t time_ns) {
   error_behaviour(time_ns);
 }
 
-// A lazy stack's: told, and nothing else.
+// For a lazy stack: only reports the error.
 void CanopenSlave::check_sync(std::int64_t time_ns) {
   const std::int64_t period_ns = dictionary_.number(0x1006) * 1'000;
   if (period_ns == 0 || last_sync_ns_ == never || time_ns - last_sync_ns_ <= period_ns + period_ns / 2) return;
@@ -362,8 +362,8 @@ void CanopenSlave::transmit_on_sync(std::int64_t time_ns) noexcept {
   }
 }
 
-// Types 254 and 255: on a change, not sooner than the inhibit time after the last; at the latest when the event timer
-// runs out.
+// Types 254 and 255: on a change, but not within the inhibit time after the last one; at the latest when the event
+// timer expires.
 void CanopenSlave::transmit_events(std::int64_t time_ns) noexcept {
   for (auto& pdo : transmit_) {
     if (!pdo->pdo.valid() || pdo->pdo.synchronous()) continue;
@@ -387,7 +387,7 @@ void CanopenSlave::transmit(Transmit& pdo, const std::array<std::uint8_t, 64>& d
   frame.fd = frame.bit_rate_switch = config_.fd;
   port_.send(frame, time_ns);
   if (!quirks_.has_twin) return;
-  frame.data[2] ^= 0x40U;  // in the position
+  frame.data[2] ^= 0x40U;  // changes the position
   port_.send(frame, time_ns);
 }
 
@@ -396,7 +396,7 @@ void CanopenSlave::transmit(Transmit& pdo, const std::array<std::uint8_t, 64>& d
 SdoAbort CanopenSlave::check_consumer(std::uint8_t subindex, std::int64_t value) const noexcept {
   const std::int64_t node = value >> 16 & 0xFF;
   if (value >> 24 != 0 || node > 127) return SdoAbort::invalid_value;
-  if ((value & 0xFFFF) == 0 || node == 0) return SdoAbort::none;  // not used
+  if ((value & 0xFFFF) == 0 || node == 0) return SdoAbort::none;  // unused
   for (std::uint8_t i = 1; i <= consumers; ++i) {
     const std::int64_t other = dictionary_.number(0x1016, i);
     if (i != subindex && (other & 0xFFFF) != 0 && (other >> 16 & 0xFF) == node) {
@@ -439,7 +439,7 @@ void CanopenSlave::clear_error(std::uint16_t code, std::int64_t time_ns) noexcep
   send_emergency(errors_.empty() ? emcy::no_error : errors_.back().code, time_ns);
 }
 
-// code u16 | error register u8 | 5 bytes of the maker's, here 0
+// code u16 | error register u8 | 5 bytes of the maker, here 0
 void CanopenSlave::send_emergency(std::uint16_t code, std::int64_t time_ns) noexcept {
   std::uint8_t bits = 0;
   for (const Error& error : errors_) bits = static_cast<std::uint8_t>(bits | error.register_bits);

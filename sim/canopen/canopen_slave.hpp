@@ -1,14 +1,15 @@
-// A CANopen device as its bus sees it (CiA 301): NMT state machine, SDO server, PDOs, SYNC, EMCY, heartbeat both ways.
+// A simulated CANopen device (CiA 301): NMT state machine, SDO server, PDOs, SYNC, EMCY, heartbeat as producer and
+// consumer.
 //
-// What the device is for comes from a CanopenApplication (a drive). Written from the standard and independent of the
-// master in fieldbus, so that each of the two tests the other.
+// A CanopenApplication (a drive) adds the device's function. Written from the standard, without code of the master in
+// fieldbus, so that each tests the other.
 //
 // Frames (identifier: data):
 //   000: command, node            NMT: 01 start, 02 stop, 80 pre-operational, 81 reset node, 82 reset communication
 //   080: (empty)                  SYNC (identifier from 1005h)
-//   080 + node: code u16, error register u8, 5 bytes of the maker's       EMCY
+//   080 + node: code u16, error register u8, 5 bytes defined by the maker  EMCY
 //   580 + node, 600 + node        SDO answers and requests
-//   700 + node, remote request    node guarding: answered by the state, bit 7 toggling, while 1017h is 0
+//   700 + node, remote request    node guarding: the answer is the state, bit 7 toggling, while 1017h is 0
 //   700 + node: state             boot-up 00; heartbeat 04 stopped, 05 operational, 7F pre-operational
 #pragma once
 
@@ -29,7 +30,7 @@ namespace proxarm::sim {
 
 enum class NmtState : std::uint8_t { initialising = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7F };
 
-// EMCY error codes used here (CiA 301, table 26; CiA 402-2 for the drive's own).
+// EMCY error codes used here (CiA 301, table 26; CiA 402-2 for drives).
 namespace emcy {
 constexpr std::uint16_t no_error = 0x0000;
 constexpr std::uint16_t communication = 0x8100;
@@ -49,18 +50,18 @@ constexpr std::uint8_t communication = 0x10;
 constexpr std::uint8_t profile_specific = 0x20;
 }  // namespace error_register
 
-// The part of a device that knows what the device does.
+// The device's function.
 class CanopenApplication {
  public:
   virtual ~CanopenApplication() = default;
 
-  // SYNC came: synchronous receive PDOs have been written to the dictionary, transmit PDOs will be read from it next.
+  // At SYNC, after synchronous receive PDOs were written to the dictionary and before transmit PDOs are read from it.
   virtual void on_sync(std::int64_t time_ns) = 0;
-  // The NMT state changed, by command, by reset or by the reaction to an error.
+  // The NMT state changed, by command, reset or reaction to an error.
   virtual void on_nmt_state(NmtState from, NmtState to, std::int64_t time_ns) = 0;
-  // Heartbeat lost (8130h) or receive PDO overdue (8250h); the EMCY is out, 1029h comes next.
+  // Heartbeat lost (8130h) or receive PDO overdue (8250h). Called after the EMCY and before the reaction by 1029h.
   virtual void on_communication_lost(std::uint16_t code, std::int64_t time_ns) = 0;
-  // Reset of the whole device (not just of its communication), dictionary back at its defaults.
+  // The whole device was reset (not just communication); the dictionary has its default values.
   virtual void on_reset(std::int64_t time_ns) = 0;
 };
 
@@ -71,9 +72,9 @@ struct CanopenSlaveConfig {
   std::string device_name;
   StackBehaviour stack = StackBehaviour::strict;
   bool fd = false;                            // its PDOs are CAN FD frames at the data bitrate
-  std::int64_t boot_time_ns = 20'000'000;     // from power or reset to the boot-up frame
-  std::int64_t sdo_answer_time_ns = 100'000;  // the firmware's time from a request to its answer
-  std::int64_t pdo_answer_time_ns = 20'000;   // from SYNC to the transmit PDO at the controller
+  std::int64_t boot_time_ns = 20'000'000;     // from power on or reset to the boot-up frame
+  std::int64_t sdo_answer_time_ns = 100'000;  // from a request to its answer
+  std::int64_t pdo_answer_time_ns = 20'000;   // from SYNC until the transmit PDO is ready
 };
 
 class CanopenSlave final : public BusDevice {
@@ -91,16 +92,16 @@ class CanopenSlave final : public BusDevice {
   [[nodiscard]] NmtState state() const noexcept { return state_; }
   [[nodiscard]] const CanopenSlaveConfig& config() const noexcept { return config_; }
 
-  // An error appears or goes. A new one is told by EMCY, kept in 1003h and shown in 1001h; when the last one has gone,
-  // EMCY 0000h says so. Raising one that is there already does nothing.
+  // An error appears or ends. A new error is sent as EMCY, stored in 1003h and shown in 1001h; after the last error's
+  // end, EMCY 0000h is sent. Raising an error that is present does nothing.
   void raise_error(std::uint16_t code, std::uint8_t register_bits, std::int64_t time_ns) noexcept;
   void clear_error(std::uint16_t code, std::int64_t time_ns) noexcept;
   [[nodiscard]] bool has_error(std::uint16_t code) const noexcept;
-  // A fault reset: errors of the connection that a latching stack has kept go, if their cause has.
+  // Fault reset: clears communication errors that a latching stack has kept, unless their cause persists.
   void acknowledge(std::int64_t time_ns) noexcept;
 
   [[nodiscard]] SlaveQuirks& quirks() noexcept { return quirks_; }
-  // A boot-up frame of its own accord, and an EMCY that changes nothing (error register 0).
+  // Sends a boot-up frame without a reset, or an EMCY without effect (error register 0).
   void say_boot_up(std::int64_t time_ns) noexcept { send_state(NmtState::initialising, time_ns); }
   void say_warning(std::uint16_t code, std::int64_t time_ns) noexcept;
 
@@ -113,9 +114,9 @@ class CanopenSlave final : public BusDevice {
     Receive(ObjectDictionary& dictionary, int number, std::uint8_t node, bool fd)
         : pdo(dictionary, SlavePdo::Direction::receive, number, node, number == 1, fd) {}
     SlavePdo pdo;
-    std::array<std::uint8_t, 64> data{};  // waiting for SYNC
+    std::array<std::uint8_t, 64> data{};  // until SYNC
     bool waiting = false;
-    std::int64_t last_ns = never;  // supervised by the event timer once the first one has come
+    std::int64_t last_ns = never;  // the event timer watches from the first PDO on
     bool overdue = false;
   };
   struct Transmit {
@@ -124,12 +125,12 @@ class CanopenSlave final : public BusDevice {
     SlavePdo pdo;
     std::array<std::uint8_t, 64> last{};
     std::int64_t last_ns = never;
-    int syncs = 0;  // since the last one was sent
+    int syncs = 0;  // since the last transmission
   };
   struct Consumer {
     std::uint8_t node = 0;
     std::int64_t limit_ns = 0;
-    std::int64_t last_ns = never;  // monitored once the first heartbeat has come
+    std::int64_t last_ns = never;  // watched from the first heartbeat on
     bool lost = false;
   };
   struct Error {
@@ -143,7 +144,7 @@ class CanopenSlave final : public BusDevice {
   void on_nmt_command(const fieldbus::CanFrame& frame, std::int64_t time_ns);
   void on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns);
   void on_sdo(const fieldbus::CanFrame& frame, std::int64_t time_ns);
-  [[nodiscard]] bool is_pdo(std::uint32_t id) const noexcept;  // one that it receives
+  [[nodiscard]] bool is_pdo(std::uint32_t id) const noexcept;  // a PDO that it receives
   void on_receive_pdo(Receive& receive, const fieldbus::CanFrame& frame, std::int64_t time_ns);
   void on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
   void check_heartbeats(std::int64_t time_ns);
@@ -154,7 +155,7 @@ class CanopenSlave final : public BusDevice {
   [[nodiscard]] bool latches() const noexcept { return config_.stack == StackBehaviour::latching; }
   [[nodiscard]] bool refuses_start() const noexcept;
   [[nodiscard]] bool insists() const noexcept { return config_.stack == StackBehaviour::insisting; }
-  [[nodiscard]] bool hears_all() const noexcept;  // no heartbeat that it watches is lost
+  [[nodiscard]] bool hears_all() const noexcept;  // no watched heartbeat is lost
   void transmit_events(std::int64_t time_ns) noexcept;
   void transmit_on_sync(std::int64_t time_ns) noexcept;
   void transmit(Transmit& transmit, const std::array<std::uint8_t, 64>& data, std::int64_t time_ns) noexcept;
@@ -180,12 +181,12 @@ class CanopenSlave final : public BusDevice {
   std::vector<Error> errors_;
 
   NmtState state_ = NmtState::initialising;
-  std::int64_t boot_ns_ = never;   // when initialising ends
-  std::int64_t heartbeat_ns_ = 0;  // when the next one is due
+  std::int64_t boot_ns_ = never;   // end of initialising
+  std::int64_t heartbeat_ns_ = 0;  // time of the next one
   std::int64_t heartbeat_period_ns_ = 0;
   std::int64_t last_sync_ns_ = never;
   std::int64_t last_sdo_ns_ = 0;
-  std::int64_t last_guard_ns_ = never;  // monitored once the first request has come
+  std::int64_t last_guard_ns_ = never;  // watched from the first request on
   bool life_lost_ = false;
   SlaveQuirks quirks_;
   std::uint32_t syncs_ = 0;  // since power on

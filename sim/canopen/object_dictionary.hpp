@@ -1,8 +1,5 @@
-// The object dictionary of a simulated CANopen device (CiA 301, 7.4): entries by index and subindex, each with its
-// type, who may access it, whether it may be mapped into a PDO, the value it starts with, and what happens when it is
-// written.
-//
-// Values are kept as they go over the wire: little-endian bytes.
+// The object dictionary of a simulated CANopen device (CiA 301, 7.4): entries by index and subindex, with type, access,
+// whether a PDO may map it, default value and write hooks. Values are stored as on the wire: little-endian bytes.
 #pragma once
 
 #include <cstdint>
@@ -50,7 +47,7 @@ enum class Access : std::uint8_t {
   read_only,
   write_only,
   read_write,
-  constant,  // read-only, and never changed by the device either
+  constant,  // read-only, and the device doesn't change it either
 };
 
 // Data types with their CiA 301 numbers.
@@ -79,7 +76,7 @@ enum class DataType : std::uint16_t {
   unsigned64 = 0x001B,
 };
 
-// Bytes of a type of fixed length; 0 for strings and domains.
+// Size in bytes of a type of fixed length; 0 for strings and domains.
 [[nodiscard]] std::size_t size_of(DataType type) noexcept;
 
 struct ObjectEntry {
@@ -88,26 +85,25 @@ struct ObjectEntry {
   DataType type = DataType::unsigned32;
   Access access = Access::read_write;
   bool pdo_mappable = false;
-  bool hidden = false;                      // the device has it for itself: nobody on the network finds it
+  bool hidden = false;                      // used by the device, but not visible on the network
   std::vector<std::uint8_t> value;          // present value; of fixed length unless a string or domain
   std::vector<std::uint8_t> default_value;  // after a reset
-  std::size_t max_length = 0;               // strings and domains: longest value accepted
+  std::size_t max_length = 0;               // longest accepted string or domain
   std::optional<std::int64_t> minimum, maximum;
-  // Asked before a write over SDO or PDO is taken over, with the new value (0 for strings and domains); what it returns
-  // other than `none` refuses the write.
+  // Called before a write over SDO or PDO takes effect, with the new value (0 for strings and domains). A result other
+  // than `none` refuses the write.
   std::function<SdoAbort(std::int64_t)> before_write;
-  // Called after a write was taken over.
   std::function<void()> after_write;
 
-  // The value as a number, sign-extended where the type is signed. 0 for strings and domains. Never throws.
+  // The value as a number, sign-extended for signed types; 0 for strings and domains. Never throws.
   [[nodiscard]] std::int64_t number() const noexcept;
-  // Sets the value as the device itself does: no access check, no hooks, truncated to the type's length.
+  // Sets the value without access check and hooks, truncated to the type's length.
   void set(std::int64_t number) noexcept;
 };
 
 class ObjectDictionary {
  public:
-  // Adds a number; the entry stays where it is for the dictionary's life.
+  // Adds a number; the reference stays valid as long as the dictionary.
   ObjectEntry& add(std::uint16_t index, std::uint8_t subindex, DataType type, Access access, std::int64_t value,
                    bool pdo_mappable = false);
   ObjectEntry& add_text(std::uint16_t index, std::uint8_t subindex, std::string_view text);
@@ -115,24 +111,24 @@ class ObjectDictionary {
 
   [[nodiscard]] ObjectEntry* find(std::uint16_t index, std::uint8_t subindex) noexcept;
   [[nodiscard]] const ObjectEntry* find(std::uint16_t index, std::uint8_t subindex) const noexcept;
-  // All of them, for whoever builds the device.
+  // All entries, for the code that builds the device.
   [[nodiscard]] std::map<std::uint32_t, ObjectEntry>& entries() noexcept { return entries_; }
-  // An entry that is known to be there.
+  // Precondition: the entry exists.
   [[nodiscard]] ObjectEntry& at(std::uint16_t index, std::uint8_t subindex = 0);
-  [[nodiscard]] std::int64_t number(std::uint16_t index, std::uint8_t subindex = 0) const noexcept;  // 0 if not there
+  [[nodiscard]] std::int64_t number(std::uint16_t index, std::uint8_t subindex = 0) const noexcept;  // 0: no entry
 
-  // Whether the network finds anything under this index.
+  // True if the network finds an object with this index.
   [[nodiscard]] bool shows(std::uint16_t index) const noexcept;
 
-  // Access from the network. `read` gives the entry, `write` takes the bytes over when everything about them is right.
+  // Access from the network. `read` returns the entry; `write` stores the bytes if all checks pass.
   [[nodiscard]] SdoAbort read(std::uint16_t index, std::uint8_t subindex, const ObjectEntry*& entry) const noexcept;
   [[nodiscard]] SdoAbort write(std::uint16_t index, std::uint8_t subindex, std::span<const std::uint8_t> bytes);
-  // The checks of `write` that need no value, for the start of a long transfer. `length` 0: not known yet.
+  // The checks of `write` that need no value, for the start of a long transfer. `length` 0: unknown.
   [[nodiscard]] SdoAbort can_write(std::uint16_t index, std::uint8_t subindex, std::size_t length) const noexcept;
-  // Takes over bytes of the entry's own length that came in a PDO; false when the value was refused.
+  // Stores bytes received in a PDO; false if the value is refused. Precondition: they have the entry's length.
   static bool write_mapped(ObjectEntry& entry, std::span<const std::uint8_t> bytes);
 
-  // Back to the default values in indices first..last, hooks not called.
+  // Restores default values in indices first..last without calling hooks.
   void restore_defaults(std::uint16_t first, std::uint16_t last) noexcept;
 
  private:
@@ -140,7 +136,7 @@ class ObjectDictionary {
                                          const ObjectEntry*& entry) const noexcept;
   static SdoAbort take_over(ObjectEntry& entry, std::span<const std::uint8_t> bytes);
 
-  std::map<std::uint32_t, ObjectEntry> entries_;  // by index << 8 | subindex
+  std::map<std::uint32_t, ObjectEntry> entries_;  // key: index << 8 | subindex
 };
 
 }  // namespace proxarm::sim

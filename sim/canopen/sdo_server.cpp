@@ -6,7 +6,7 @@ namespace proxarm::sim {
 
 namespace {
 
-constexpr std::uint8_t own_block_size = 127;  // segments that this server takes in one sub-block; 1..127
+constexpr std::uint8_t own_block_size = 127;  // segments that this server accepts in one sub-block; 1..127
 constexpr std::size_t longest_download = std::size_t{1} << 20;  // bytes collected before the object is asked
 
 std::uint32_t u32_at(const SdoServer::Message& m, std::size_t at) noexcept {
@@ -33,11 +33,11 @@ std::uint16_t sdo_block_crc(std::span<const std::uint8_t> bytes, std::uint16_t c
 std::span<const SdoServer::Message> SdoServer::on_request(const Message& request) {
   answers_.clear();
   const std::uint8_t command = request[0];
-  if (command == 0x80) {  // abort, in every phase: no segment has sequence number 0
+  if (command == 0x80) {  // abort, also among segments, as none has sequence number 0
     on_abort();
     return answers_;
   }
-  if (phase_ == Phase::block_download) {  // every byte 0 is a sequence number here
+  if (phase_ == Phase::block_download) {  // byte 0 is always a sequence number here
     block_download_segment(request);
     return answers_;
   }
@@ -93,7 +93,7 @@ void SdoServer::abort(SdoAbort code) {
   phase_ = Phase::idle;
 }
 
-// Everything has arrived: the dictionary has the last word.
+// All data received: the dictionary checks and stores them.
 void SdoServer::finish_download(const Message& message) {
   phase_ = Phase::idle;
   if (expected_ != 0 && data_.size() != expected_) return abort(SdoAbort::length_does_not_match);
@@ -108,7 +108,7 @@ void SdoServer::begin_download(const Message& request) {
   const std::size_t unused = static_cast<std::size_t>(request[0] >> 2 & 0x03);
   if (expedited) {
     std::size_t length = 4 - unused;
-    if (!size_indicated) {  // the object's own length counts
+    if (!size_indicated) {  // the object's length counts
       const ObjectEntry* entry = dictionary_.find(index_, subindex_);
       const std::size_t own = entry == nullptr ? 0 : size_of(entry->type);
       length = own == 0 || own > 4 ? 4 : own;
@@ -203,7 +203,7 @@ void SdoServer::begin_block_download(const Message& request) {
 }
 
 // c sequence | data      →  at the end of a sub-block: A2 | last sequence number in order | segments per sub-block
-// Segments out of order are left out; the acknowledgement makes the client repeat from there.
+// Segments out of order are ignored; the acknowledgement makes the client repeat them.
 void SdoServer::block_download_segment(const Message& request) {
   const bool last = (request[0] & 0x80) != 0;
   const std::uint8_t sequence = request[0] & 0x7F;
@@ -231,7 +231,7 @@ void SdoServer::end_block_download(const Message& request) {
 }
 
 // 101 0 0 cc 00 | index | subindex | segments | pst     →  110 0 0 sc s 0 | index | subindex | size
-// Where the value is no longer than the protocol switch threshold pst, the normal upload takes over.
+// A value not longer than the protocol switch threshold pst is uploaded without blocks.
 void SdoServer::begin_block_upload(const Message& request) {
   remember_object(request);
   const ObjectEntry* entry = nullptr;
@@ -274,7 +274,7 @@ void SdoServer::acknowledge_block_upload(const Message& request) {
   answer(message);
 }
 
-// Segments c sequence | data from the first byte that hasn't been confirmed on.
+// Sends segments (c sequence | data), starting at the first unconfirmed byte.
 void SdoServer::send_sub_block() {
   std::size_t at = sent_;
   sequence_ = 0;

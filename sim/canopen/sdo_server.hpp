@@ -1,6 +1,5 @@
 // The SDO server of a simulated CANopen device (CiA 301, 7.2.4): expedited, segmented and block transfers, both ways.
-//
-// Written from the standard, apart from the client in fieldbus, so that each of the two tests the other.
+// Written from the standard, without code of the client in fieldbus, so that each tests the other.
 #pragma once
 
 #include <array>
@@ -21,12 +20,12 @@ class SdoServer {
 
   explicit SdoServer(ObjectDictionary& dictionary) : dictionary_(dictionary) {}
 
-  // Takes the eight bytes of a request and gives the messages to be sent in answer, in order: none, one, or a whole
-  // sub-block of a block upload. Valid until the next call. Whatever the bytes are, the state stays sound; a request
-  // that begins a transfer abandons the one before it.
+  // Handles the eight bytes of a request and returns the messages to be sent, in order: none, one, or a whole sub-block
+  // of a block upload. Valid until the next call. Any bytes are safe. A request that begins a transfer ends the
+  // previous one.
   [[nodiscard]] std::span<const Message> on_request(const Message& request);
 
-  // Communication reset: a transfer under way is forgotten.
+  // Communication reset: ends a transfer in progress.
   void reset() noexcept { phase_ = Phase::idle; }
 
  private:
@@ -35,10 +34,10 @@ class SdoServer {
     segmented_download,
     segmented_upload,
     block_download,      // receiving segments
-    block_download_end,  // all segments in, waiting for the end request with the CRC
-    block_upload_start,  // answered the initiate request, waiting for the start
-    block_upload,        // a sub-block is out, waiting for its acknowledgement
-    block_upload_end,    // end request is out, waiting for its confirmation
+    block_download_end,  // all segments received, waiting for the end request with the CRC
+    block_upload_start,  // initiate request answered, waiting for the start
+    block_upload,        // sub-block sent, waiting for its acknowledgement
+    block_upload_end,    // end request sent, waiting for its confirmation
   };
 
   void on_abort() noexcept { phase_ = Phase::idle; }
@@ -66,12 +65,12 @@ class SdoServer {
   Phase phase_ = Phase::idle;
   std::uint16_t index_ = 0;
   std::uint8_t subindex_ = 0;
-  std::vector<std::uint8_t> data_;  // collected so far, or to be sent
-  std::size_t expected_ = 0;        // bytes that the client announced; 0: it didn't
-  std::size_t sent_ = 0;            // bytes of data_ confirmed to have been sent
+  std::vector<std::uint8_t> data_;  // received so far, or to be sent
+  std::size_t expected_ = 0;        // bytes announced by the client; 0: not announced
+  std::size_t sent_ = 0;            // bytes of data_ that the client has confirmed
   std::uint8_t toggle_ = 0;
   std::uint8_t block_size_ = 0;  // segments per sub-block
-  std::uint8_t sequence_ = 0;    // of the last segment received in order, or of the last one sent
+  std::uint8_t sequence_ = 0;    // last segment received in order, or last one sent
   bool with_crc_ = false;
 };
 

@@ -2,8 +2,9 @@
 //
 //   receive PDO n:  parameters 1400h + n − 1, mapping 1600h + n − 1, identifier 200h, 300h, 400h, 500h + node
 //   transmit PDO n: parameters 1800h + n − 1, mapping 1A00h + n − 1, identifier 180h, 280h, 380h, 480h + node
-//   parameters: 1 identifier (bit 31: PDO not valid), 2 transmission type, 3 inhibit time in 100 µs, 5 event timer in
-//   ms mapping:    0 number of objects, then index << 16 | subindex << 8 | bits each; bytes follow in that order
+//   parameters: 1 identifier (bit 31: PDO not valid), 2 transmission type, 3 inhibit time in 100 µs,
+//               5 event timer in ms
+//   mapping:    0 number of objects, then index << 16 | subindex << 8 | bits each; bytes follow in that order
 #pragma once
 
 #include <array>
@@ -14,21 +15,20 @@
 
 namespace proxarm::sim {
 
-// What both directions share: the parameters, and the mapping as found in the dictionary.
+// Common to both directions: parameters and mapping, as read from the dictionary.
 class SlavePdo {
  public:
   enum class Direction : std::uint8_t { receive, transmit };
 
-  // Adds the PDO's objects; `number` 1..4. Not valid at first unless `valid`.
-  // CAN FD: up to 64 bytes and objects, otherwise 8.
+  // Adds the PDO's objects; `number` 1..4. At first valid only if `valid`. CAN FD: up to 64 bytes and objects, else 8.
   SlavePdo(ObjectDictionary& dictionary, Direction direction, int number, std::uint8_t node, bool valid,
            bool fd = false);
   SlavePdo(const SlavePdo&) = delete;
   SlavePdo& operator=(const SlavePdo&) = delete;
 
-  // What is mapped after a reset; the objects must be there by then.
+  // Mapping after a reset. Precondition: the objects exist by then.
   void set_default_mapping(std::initializer_list<std::uint32_t> objects);
-  // Takes parameters and mapping from the dictionary; on every change of them and after a reset.
+  // Reads parameters and mapping from the dictionary; call after each change and after a reset.
   void configure() noexcept;
 
   [[nodiscard]] bool valid() const noexcept { return valid_ && count_ > 0; }
@@ -37,11 +37,11 @@ class SlavePdo {
   [[nodiscard]] bool synchronous() const noexcept { return type_ <= 240; }
   [[nodiscard]] std::int64_t inhibit_ns() const noexcept { return inhibit_ns_; }
   [[nodiscard]] std::int64_t event_timer_ns() const noexcept { return event_timer_ns_; }
-  [[nodiscard]] std::uint8_t length() const noexcept { return length_; }  // bytes mapped, 0..8, CAN FD 0..64
+  [[nodiscard]] std::uint8_t length() const noexcept { return length_; }  // mapped bytes, 0..8, CAN FD 0..64
 
-  // Writes the mapped objects from a PDO of at least length() bytes.
+  // Writes the mapped objects from PDO data. Precondition: at least length() bytes.
   void unpack(std::span<const std::uint8_t> bytes);
-  // Builds the PDO's data; bytes past length() stay as they are.
+  // Builds the PDO's data; bytes past length() stay unchanged.
   void pack(std::array<std::uint8_t, 64>& bytes) const noexcept;
 
  private:
@@ -66,7 +66,7 @@ class SlavePdo {
   std::uint8_t type_ = 255;
   std::int64_t inhibit_ns_ = 0;
   std::int64_t event_timer_ns_ = 0;
-  std::int64_t most_;  // objects, and bytes
+  std::int64_t most_;  // of objects, and of bytes
   std::array<Mapped, 64> mapped_{};
   std::uint8_t count_ = 0;
   std::uint8_t length_ = 0;

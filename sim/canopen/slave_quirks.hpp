@@ -1,4 +1,4 @@
-// What a simulated CANopen slave does otherwise than CiA 301 says, or than a good line would let it.
+// Deviations of a simulated CANopen slave from CiA 301, and effects of a bad line.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,14 @@ namespace proxarm::sim {
 struct SlaveQuirks {
   bool mutes_heartbeat = false;
   bool mutes_sdo = false;
-  bool has_twin = false;           // another node has its number: each transmit PDO comes twice, with two positions
-  bool toggles_heartbeat = false;  // bit 7 of its state changes each time, as in answers of node guarding
-  bool sdo_sizeless = false;       // expedited read answers without their size (42h): four bytes, whatever the object
-  bool sdo_doubled = false;        // each SDO answer comes twice
-  bool sdo_stray = false;          // before each SDO answer one for an object that nobody asked for
-  std::int64_t sdo_late_ns = 0;    // by which each SDO answer comes later
-  std::uint32_t hears_no_sync_in = 0;  // of so many SYNCs it misses one; 0: none
-  int tpdo_bytes = -1;                 // length of its transmit PDOs, whatever is mapped; −1: what is mapped
+  bool has_twin = false;           // another node has its number: each transmit PDO is sent twice, with two positions
+  bool toggles_heartbeat = false;  // bit 7 of its state toggles, as in node guarding
+  bool sdo_sizeless = false;       // expedited read answers don't give their size (42h): always four bytes
+  bool sdo_doubled = false;        // each SDO answer is sent twice
+  bool sdo_stray = false;          // before each SDO answer, sends one for another object
+  std::int64_t sdo_late_ns = 0;    // additional delay of each SDO answer
+  std::uint32_t hears_no_sync_in = 0;  // it misses one of this many SYNCs; 0: none
+  int tpdo_bytes = -1;                 // length of its transmit PDOs; −1: as mapped
 };
 
 }  // namespace proxarm::sim

@@ -1,4 +1,4 @@
-// One axis of the simulated arm as its drive sees it: in encoder counts, with a motor and an encoder that may lie.
+// One axis of the simulated arm for its drive: in encoder counts, with simulated faults of motor and encoder.
 #pragma once
 
 #include <cmath>
@@ -51,7 +51,7 @@ class PlantAxis final : public ServoAxis {
   [[nodiscard]] bool limited() const noexcept override { return servo_.limited(); }
   [[nodiscard]] bool at_rest() const noexcept override { return servo_.at_rest(); }
 
-  // What the drive makes of its targets, what its motor can, and what it says of where it is; false: not one of these.
+  // Faults of how the drive uses its targets, of its motor's torque and of its encoder; false for other faults.
   bool set_fault(const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept;
 
  private:
@@ -62,8 +62,8 @@ class PlantAxis final : public ServoAxis {
   ServoLoop& servo_;
   double counts_per_rad_, rated_torque_Nm_, max_torque_Nm_;
   double runaway_counts_per_s_ = 0.0;
-  std::int32_t target_share_ = 1;  // of the way from since_counts_ to a target; of a torque: 0 leaves the last one
-  double torque_ratio_ = 0.0;      // that is asked of the motor
+  std::int32_t target_share_ = 1;  // factor on the way from since_counts_ to a target; on torques, 0 keeps the last
+  double torque_ratio_ = 0.0;      // requested of the motor
   std::int32_t since_counts_ = 0, offset_counts_ = 0, stuck_at_counts_ = 0;
   std::int64_t since_ns_ = 0;
   bool stuck_ = false;

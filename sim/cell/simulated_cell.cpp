@@ -15,7 +15,7 @@ namespace {
 
 using description::SetupError;
 
-// 6065h as such drives are delivered: at the joint. The master may set another.
+// Factory setting of 6065h, at the joint. The master may change it.
 constexpr double following_error_window_rad = 0.05;
 
 double counts_per_rad(const description::DriveDescription& drive) noexcept { return std::abs(drive.counts_per_rad()); }
@@ -28,7 +28,7 @@ std::int32_t to_i32(double value) noexcept {
   return static_cast<std::int32_t>(std::clamp(std::nearbyint(value), -2147483648.0, 2147483647.0));
 }
 
-// Who it is, by its maker's file: [DeviceInfo], else the defaults of 1018h.
+// Identity by the maker's file: [DeviceInfo], else the defaults of 1018h.
 void take_identity(const description::EdsFile& eds, CanopenSlaveConfig& canopen) {
   const auto number = [&eds](std::optional<std::uint32_t> of_device, std::uint32_t object) -> std::uint32_t {
     const description::EdsObject* there = eds.find(object);
@@ -84,7 +84,7 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   if (drive.homing) {
     const double home = drive.offset_counts + drive.homing->angle_rad * drive.counts_per_rad();
     c.incremental = {.home_counts = to_i32(home)};
-    c.position_min = to_i32(std::min(first, second) - home);  // by its own zero, once it is homed
+    c.position_min = to_i32(std::min(first, second) - home);  // relative to the drive's zero after homing
     c.position_max = to_i32(std::max(first, second) - home);
   }
   const double rated_Nm = drive.rated_torque_Nm > 0.0 ? drive.rated_torque_Nm : drive.simulation.max_torque_Nm;
@@ -92,7 +92,7 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   return c;
 }
 
-// A drive that lacks an object, has it read-only, has another value in it, or takes none for it.
+// Faults of objects: missing, read-only, another value, or a refused value.
 void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
   constexpr DeviceFaultKind of_objects[] = {DeviceFaultKind::object_missing, DeviceFaultKind::object_fixed,
                                             DeviceFaultKind::object_holds, DeviceFaultKind::value_refused};
@@ -120,7 +120,7 @@ void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
   }
 }
 
-// A drive whose mapping may hold only what its mode knows.
+// The drive accepts mapped objects only while a mode is set.
 void map_only_in_a_mode(ObjectDictionary& dictionary) {
   constexpr std::uint16_t mappings[] = {0x1600, 0x1A00};
   for (const std::uint16_t mapping : mappings) {
@@ -146,7 +146,7 @@ std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cel
   return buses;
 }
 
-// ---- Where devices meet the physics
+// ---- Devices' access to the physics
 
 class SimulatedCell::PlantGauges final : public GaugeSource {
  public:
@@ -170,7 +170,7 @@ class SimulatedCell::WirelessModbus final : public fieldbus::ModbusClient {
       if (device->unit() != request.bytes[0]) continue;
       if (device->fault() == ModbusFault::closed) return fieldbus::ModbusResult::closed;
       const std::vector<std::uint8_t> bytes = device->serve(request.span());
-      // The master waits in vain for the rest of half an answer.
+      // After half an answer, the master waits for the rest until its timeout.
       if (bytes.empty() || device->fault() == ModbusFault::half) return fieldbus::ModbusResult::timeout;
       std::copy(bytes.begin(), bytes.end(), answer.bytes.begin());
       answer.size = bytes.size();
@@ -263,7 +263,7 @@ void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& confi
   }
 }
 
-// Wired to a drive's inputs, or a node with a message of its own.
+// The switch is wired to a drive's inputs, or is a node with a message.
 void SimulatedCell::add_enabling(const std::vector<PressedSpan>& spans) {
   if (!cell_.enabling_input) return;
   const description::EnablingInputDescription& input = *cell_.enabling_input;
@@ -410,7 +410,7 @@ void SimulatedCell::tick(std::int64_t time_ns) noexcept {
   }
 }
 
-// A streaming sensor's own clock: nothing on the bus sets it.
+// A streaming sensor's clock runs independently of the bus.
 void SimulatedCell::convert(std::int64_t time_ns) noexcept {
   advance_to(time_ns);
   described_sensor_->on_converter(time_ns);

@@ -1,10 +1,9 @@
-// The far end of all wires of a cell: arm, hand and physics, with a drive per joint and the force sensor on their
-// buses.
+// A whole simulated cell: arm, hand and physics, with a drive per joint and the force sensor on their buses.
 //
 //   SimulatedCell far_end(cell, sensor, hand, network.events());
 //   far_end.attach_to(network);   // in-process; or connect() each node to a port of a real interface
 //   far_end.power_on();
-// From then on it lives by events and frames alone. It knows nothing of the controller.
+// From then on, only events and frames drive it. It doesn't know the controller.
 #pragma once
 
 #include <cstdint>
@@ -37,32 +36,31 @@ class PlantAxis;
 struct SimulatedCellConfig {
   PlantConfig plant;
   std::vector<DeviceFault> faults;
-  std::vector<PressedSpan> enabling;  // of the cell's enabling input; none: pressed from 0.1 s on
-  bool helps_to_prove = false;        // somebody pushes as a proof asks for it (proof_helper.hpp)
-  std::int64_t tick_ns = 1'000'000;   // how often devices look at the clock; physics has its own step
+  std::vector<PressedSpan> enabling;  // times at which the enabling input is pressed; empty: from 0.1 s on
+  bool helps_to_prove = false;        // a simulated person pushes as a proof asks (proof_helper.hpp)
+  std::int64_t tick_ns = 1'000'000;   // interval of the devices' on_time(); the physics has another step
   std::int64_t drive_boot_time_ns = 20'000'000;
   std::int64_t brake_release_ns = 30'000'000;
 };
 
-// What is really so, in W; the controller never sees it.
+// True values of the simulation, in W; the controller never sees them.
 struct Truth {
   std::int64_t time_ns = 0;
-  models::Pose X_WT = models::Pose::Identity();        // rendered point of the handle
+  models::Pose X_WT = models::Pose::Identity();        // the handle's rendered point
   models::Vec3 velocity_W = models::Vec3::Zero();      // m/s
   models::Vec3 acceleration_W = models::Vec3::Zero();  // m/s²
-  models::Vec3 hand_force_W = models::Vec3::Zero();    // N, of the hand on the handle at T
-  models::Vec3 hand_torque_W = models::Vec3::Zero();   // Nm, of the hand on the handle about T
-  models::Wrench sensor_wrench_S;                      // load on the sensor, handle's weight and inertia included
+  models::Vec3 hand_force_W = models::Vec3::Zero();    // N, hand on handle at T
+  models::Vec3 hand_torque_W = models::Vec3::Zero();   // Nm, hand on handle about T
+  models::Wrench sensor_wrench_S;                      // load on the sensor, including the handle's weight and inertia
   bool hand_started = false;                           // all drives have been enabled once
   std::int64_t hand_start_ns = 0;
 };
 
-// The cell's buses, for a network in this process.
 std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell);
 
 class SimulatedCell final : private Clockwork {
  public:
-  // Throws SetupError: what Plant refuses, a bus that the cell doesn't have, a fault for a device that isn't there.
+  // Throws SetupError as Plant does, and for a missing bus or a fault of a missing device.
   SimulatedCell(const description::Cell& cell, const description::SensorDescription& sensor,
                 const description::HandDescription& hand, fieldbus::EventQueue& events,
                 const SimulatedCellConfig& config = {});
@@ -70,28 +68,28 @@ class SimulatedCell final : private Clockwork {
   SimulatedCell& operator=(const SimulatedCell&) = delete;
   ~SimulatedCell() override;
 
-  // Nodes, one per drive on CAN in the cell's order, then the enabling switch where it has a message and the sensor, if
-  // it is on CAN: to be connected to their buses before power_on().
+  // Nodes: one per drive on CAN in the cell's order, then the enabling switch if it has a message, then the sensor if
+  // it is on CAN. Connect them to their buses before power_on().
   [[nodiscard]] std::size_t node_count() const noexcept { return nodes_.size(); }
   [[nodiscard]] DeviceNode& node(std::size_t index) noexcept { return *nodes_[index]; }
 
-  // What is on the cell's Modbus lines: for a server on a real line, or as a master's end of a line without any wire,
-  // whose requests are answered at once. The cell must outlive both.
+  // The devices on a Modbus line, for a server on a real line, or for an in-process master whose requests are answered
+  // at once. The cell must outlive the results.
   [[nodiscard]] std::vector<ModbusUnit*> modbus_devices(const std::string& line);
   [[nodiscard]] std::unique_ptr<fieldbus::ModbusClient> modbus_client(const std::string& line);
 
-  // Connects all nodes to the buses of these names.
+  // Connects each node to the network's bus of the same name.
   void attach_to(fieldbus::SimulatedCanNetwork& network);
 
-  // Everything starts at the event queue's present time, and the physics and the devices' clocks with it.
+  // Starts all devices, the physics and the devices' clocks at the event queue's present time.
   void power_on();
 
-  // All drives lose their power at once and for good, as by the main switch: no torque, no word, brakes close.
+  // All drives lose their power at once and for good, as by the main switch: no torque, no frames, brakes close.
   void cut_power() noexcept;
 
-  // At the event queue's present time, up to one step of the physics before it.
+  // At the event queue's present time, or up to one step of the physics before it.
   [[nodiscard]] Truth truth() noexcept;
-  // Called after each step of the physics, in order of time; may allocate nothing where the run mustn't. Empty: none.
+  // Called after each step of the physics, in order of time. Empty: none. It must not allocate if the run mustn't.
   void set_observer(std::function<void(const Truth&)> observer) { observer_ = std::move(observer); }
 
   [[nodiscard]] Plant& plant() noexcept { return plant_; }
@@ -123,7 +121,7 @@ class SimulatedCell final : private Clockwork {
   void set_sensor_lie(const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept;
   void tick(std::int64_t time_ns) noexcept;
   [[nodiscard]] std::size_t bus_index(const std::string& name, const std::string& key) const;
-  [[nodiscard]] std::size_t axis_of(const std::string& joint) const noexcept;  // drives_.size(): none
+  [[nodiscard]] std::size_t axis_of(const std::string& joint) const noexcept;  // drives_.size(): no such joint
 
   description::Cell cell_;
   fieldbus::EventQueue& events_;
@@ -133,15 +131,15 @@ class SimulatedCell final : private Clockwork {
   std::vector<std::unique_ptr<DeviceNode>> nodes_;
   std::vector<std::unique_ptr<PlantAxis>> axes_;
   std::unique_ptr<PlantGauges> gauges_;
-  std::vector<std::unique_ptr<DriveDevice>> drives_;          // per axis; null: on Modbus
-  std::vector<std::unique_ptr<ModbusDevice>> modbus_drives_;  // per axis; null: on CAN
+  std::vector<std::unique_ptr<DriveDevice>> drives_;          // per axis; null: the drive is on Modbus
+  std::vector<std::unique_ptr<ModbusDevice>> modbus_drives_;  // per axis; null: the drive is on CAN
   std::vector<std::size_t> node_of_axis_;
   std::unique_ptr<PlantWrench> wrench_;
-  std::unique_ptr<AtiDevice> sensor_;                     // one of these two
-  std::unique_ptr<ModbusSensorDevice> sensor_registers_;  // of the latter, where it is on Modbus
+  std::unique_ptr<AtiDevice> sensor_;                     // null: described_sensor_ is used
+  std::unique_ptr<ModbusSensorDevice> sensor_registers_;  // of described_sensor_, if it is on Modbus
   std::unique_ptr<DescribedDevice> described_sensor_;
   std::unique_ptr<EnablingSwitch> enabling_;
-  std::size_t enabling_axis_ = 0;  // that it is wired to
+  std::size_t enabling_axis_ = 0;  // the axis that it is wired to
   std::optional<ProofHelper> helper_;
   std::function<void(const Truth&)> observer_;
 };

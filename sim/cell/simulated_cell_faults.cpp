@@ -1,4 +1,4 @@
-// What can be wrong with the devices of a simulated cell, and when: of SimulatedCell.
+// The faults of a simulated cell's devices, and their schedule: part of SimulatedCell.
 #include <algorithm>
 #include <iterator>
 #include <utility>
@@ -13,7 +13,7 @@ using description::SetupError;
 
 namespace {
 
-// A fault that this sensor can't have would do nothing.
+// Refuses faults that would have no effect on this sensor.
 void require_fault_of_sensor(const DeviceFault& fault, const description::SensorDescription& sensor) {
   require_known_fault(fault, FaultyDevice::sensor);
   const bool described = sensor.described.has_value();
@@ -42,7 +42,7 @@ void require_fault_of_sensor(const DeviceFault& fault, const description::Sensor
   }
 }
 
-// Torques have no way from which a drive could run off.
+// A torque setpoint has no position that could run away.
 void require_fault_of_mode(const DeviceFault& fault, const description::DriveDescription& drive) {
   if (fault.kind != DeviceFaultKind::runaway || drive.mode != "cst") return;
   throw SetupError({.key = "--fault",
@@ -68,7 +68,7 @@ constexpr std::pair<DeviceFaultKind, ModbusFault> modbus_faults[] = {
     {DeviceFaultKind::modbus_not_driven, ModbusFault::not_driven},
     {DeviceFaultKind::modbus_tripped, ModbusFault::tripped}};
 
-// What a drive does otherwise on the wire.
+// Deviations of a drive on the wire.
 void set_quirk(SlaveQuirks& quirks, const DeviceFault& fault, bool on) noexcept {
   switch (fault.kind) {
     case DeviceFaultKind::heartbeat_lost:

@@ -1,8 +1,8 @@
-// A simulated force sensor that speaks as its file says (models/description/sensor_protocol.hpp): the far end of
-// DescribedSensor, which shares none of this code.
+// A simulated force sensor that follows a description file (models/description/sensor_protocol.hpp): the device for
+// DescribedSensor, with which it shares no code.
 //
-// It streams by its own clock, or answers polls. Commands are obeyed when their bytes are those of the file: rate,
-// start and stop; where there is no start, it streams from power on. Bias and its clearing shift the readings.
+// It streams by its own clock or answers polls. It obeys commands with the file's bytes: rate, start, stop, bias and
+// clearing the bias. Without a start command, it streams from power on.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace proxarm::sim {
 
-// The inside of the sensor: what it measures at a time, fx fy fz (N), tx ty tz (Nm).
+// The measuring part: the wrench at a time, fx fy fz (N), tx ty tz (Nm).
 class WrenchSource {
  public:
   WrenchSource() = default;
@@ -33,7 +33,7 @@ struct DescribedDeviceConfig {
 
 class DescribedDevice final : public BusDevice {
  public:
-  // Throws SetupError for a matrix that can't be inverted: only six signals can be told from a wrench.
+  // Throws SetupError for a singular matrix: the wrench must determine the signals.
   DescribedDevice(const description::SensorDescription& sensor, const DescribedDeviceConfig& config,
                   WrenchSource& source, DevicePort& port);
 
@@ -41,7 +41,7 @@ class DescribedDevice final : public BusDevice {
   void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
   void on_time(std::int64_t) noexcept override {}
 
-  // Its converter has finished a sample: to be called every period_ns().
+  // A sample is finished; call every period_ns().
   void on_converter(std::int64_t time_ns) noexcept;
   [[nodiscard]] bool fd() const noexcept { return protocol_.fd; }
   [[nodiscard]] std::int64_t period_ns() const noexcept { return period_ns_; }
@@ -67,7 +67,7 @@ class DescribedDevice final : public BusDevice {
   std::vector<std::uint8_t> sample_;
   std::vector<std::array<double, 6>> signals_of_wrench_;  // inverse of the matrix, by rows
   std::array<double, 6> measured_{}, bias_{};
-  std::array<double, 6> numbers_{};  // of the signals in the last sample
+  std::array<double, 6> numbers_{};  // signals of the last sample
   std::uint64_t count_ = 0, frames_ = 0;
   std::int64_t period_ns_ = 0, ready_ns_ = INT64_MAX;
   bool streaming_ = false;

@@ -21,10 +21,10 @@ using ParseAmount = double (*)(std::string_view text, std::string_view option);
 
 struct KindName {
   const char* name;
-  unsigned devices;  // that know it
+  unsigned devices;  // that can have it
   DeviceFaultKind kind;
-  std::uint64_t most;                  // of its value; none: it has no value
-  ParseAmount parse_amount = nullptr;  // of one that has a quantity instead
+  std::uint64_t most;                  // of its value; `none`: without a value
+  ParseAmount parse_amount = nullptr;  // for a kind with a quantity instead
   bool is_signed = false;
 };
 
@@ -131,7 +131,7 @@ double parse_amount(const KindName& kind, std::string_view text) {
   return negative ? -amount : amount;
 }
 
-// OBJECT:CONTENT; what a refused one is aborted by may be left out.
+// OBJECT:CONTENT; the abort code of a refused object is optional.
 void parse_object(std::string_view all, std::string_view text, const KindName& kind, DeviceFault& fault) {
   const std::size_t colon = text.find(':');
   const bool holds = kind.kind == DeviceFaultKind::object_holds, refuses = kind.kind == DeviceFaultKind::value_refused;

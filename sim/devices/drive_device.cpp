@@ -104,7 +104,7 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   add_own_objects(config);
 }
 
-// A maker's dictionary has something else there.
+// Not in a maker's dictionary, which has other objects there.
 void DriveDevice::add_own_objects(const DriveDeviceConfig& config) {
   using enum DataType;
   using enum Access;
@@ -128,7 +128,7 @@ ObjectEntry& DriveDevice::add(std::uint32_t address, DataType type, Access acces
                                  access, value, mappable);
 }
 
-// What the drive does by itself. Ramps that this drive doesn't have are refused.
+// Reactions of the drive. Ramps that this drive doesn't have are refused.
 void DriveDevice::add_option_codes() {
   using enum DataType;
   ObjectDictionary& od = slave_.dictionary();
@@ -187,7 +187,7 @@ void DriveDevice::add_homing_objects() {
   od.add(0x609A, 0, unsigned32, read_write, 0);
 }
 
-// What it counts from then: CiA 402 has no position from before.
+// Zero of the encoder at power on: CiA 402 has no position from before.
 void DriveDevice::power_on_encoder() noexcept {
   homing_ = HomingState::none;
   if (!incremental_) return;
@@ -196,7 +196,7 @@ void DriveDevice::power_on_encoder() noexcept {
 
 bool DriveDevice::homes() const noexcept { return mode_->number() == homing_mode && incremental_.has_value(); }
 
-// Methods 1 to 34 find a switch, a stop or an index pulse, and all of them the same place here.
+// Methods 1 to 34 look for a switch, a stop or an index pulse; here all find the same place.
 void DriveDevice::start_homing() {
   const std::int64_t method = slave_.dictionary().number(0x6098);
   const bool known = method >= 1 && method <= 34 && slave_.dictionary().number(0x6099, 1) > 0;
@@ -221,7 +221,7 @@ void DriveDevice::advance_homing() {
   axis_.set_target(static_cast<std::int32_t>(homing_counts_), now_ns_);
   const double settled_counts = std::max(1.0, 0.02 * static_cast<double>(following_window_->number()));
   if (homing_counts_ != home || std::abs(axis_.position_counts() - home) > settled_counts) return;
-  zero_counts_ = incremental_->home_counts + slave_.dictionary().number(0x607C);  // the zero is off the home by 607Ch
+  zero_counts_ = incremental_->home_counts + slave_.dictionary().number(0x607C);  // 607Ch: from home to zero
   homing_ = HomingState::attained;
 }
 
@@ -238,7 +238,7 @@ void DriveDevice::on_sync(std::int64_t time_ns) {
   publish();
 }
 
-// Without a new one the last torque acts on: what ends it is the receive PDO's timer, or the lack of SYNC.
+// Without a new one, the last torque acts on, until the receive PDO's timer or the SYNC watch ends it.
 void DriveDevice::latch_torque() {
   following_ = false;
   if (state_ != DriveState::operation_enabled || stopping_ || !brake_open()) return;
@@ -249,7 +249,7 @@ void DriveDevice::latch_torque() {
   following_ = true;
 }
 
-// Position limits (607Dh) cut the target; with 607Ah at its old value because no PDO came, the axis slows down instead.
+// Position limits (607Dh) clamp the target. If no PDO came, so that 607Ah is old, the axis decelerates instead.
 void DriveDevice::latch_target() {
   if (mode_->number() == cyclic_synchronous_torque) return latch_torque();
   if (homes()) return;
@@ -265,7 +265,7 @@ void DriveDevice::latch_target() {
   std::int64_t target = (interpolates ? interpolated_target_ : target_)->number();
   target_limited_ = low < high && (target < low || target > high);
   if (target_limited_) target = std::clamp(target, low, high);
-  // The first target after the brake has opened must be where the axis is: nothing jumps.
+  // The first target after the brake has opened must be at the actual position, so that nothing jumps.
   if (!target_taken_ && std::llabs(target - position()) > following_window_->number()) {
     return trip(emcy::following_error, error_register::profile_specific);
   }
@@ -275,7 +275,7 @@ void DriveDevice::latch_target() {
   following_ = !target_limited_;
 }
 
-// Values for whoever reads them next, by PDO or SDO.
+// Updates the values that PDOs and SDOs read.
 void DriveDevice::publish() noexcept {
   position_->set(position());
   demand_->set(demand());
@@ -327,12 +327,12 @@ void DriveDevice::on_controlword() {
   const DriveCommand command = decode_controlword(word, controlword_before_);
   controlword_before_ = word;
   if (command == DriveCommand::disable_voltage && is_moving_state(state_) && stopping_) {
-    stopping_ = false;  // a ramp doesn't hold up the power's end
+    stopping_ = false;  // disable voltage takes the power even during a ramp
     if (state_ == DriveState::fault_reaction_active) return enter(DriveState::fault, 14);
   }
   if (stopping_) return;
   if (sto_open_ && command != DriveCommand::fault_reset) return;
-  for (int step = 0; step < 2; ++step) {  // 3 and 4 in one go when operation is commanded at once
+  for (int step = 0; step < 2; ++step) {  // 3 and 4 together if operation is commanded at once
     const DriveTransition transition = transition_for(state_, command);
     if (transition.number == 0) break;
     execute(transition);
@@ -368,7 +368,7 @@ void DriveDevice::execute(DriveTransition transition) {
     case 15:
       slave_.acknowledge(now_ns_);
       if (slave_.has_error(emcy::heartbeat_lost) || slave_.has_error(emcy::rpdo_timeout)) {
-        // The cause is still there: the connection must be back first, so the timers must have seen it again.
+        // The cause persists: the connection must return first and restart the timers.
         return;
       }
       slave_.clear_error(fault_code_, now_ns_);
@@ -407,7 +407,7 @@ void DriveDevice::power_off() noexcept {
   axis_.disable();
 }
 
-// The state stays as it is until the axis is at rest.
+// Keeps the state until the axis is at rest.
 void DriveDevice::begin_stop(DriveState after, int transition, double deceleration_counts_per_s2) {
   stopping_ = true;
   after_stop_ = after;
@@ -438,7 +438,7 @@ RefusalReason DriveDevice::refusal() const noexcept {
 
 bool DriveDevice::energised() const noexcept { return powered_; }
 
-// 60C2h: value u8 · 10^(exponent i8) s. 0 when not set, or when it is no time that a cycle can have.
+// 60C2h: value u8 · 10^(exponent i8) s. 0 if not set, or longer than 1 s.
 void DriveDevice::set_period() {
   const double period_s =
       static_cast<double>(period_value_->number()) * std::pow(10.0, static_cast<double>(period_index_->number()));
@@ -475,7 +475,7 @@ void DriveDevice::supervise_sync() {
   if (now_ns_ - last_sync_ns_ > tolerance * period_ns_) trip(emcy::sync_controller, error_register::communication);
 }
 
-// 8611h when the window (6065h) is left for longer than 6066h says.
+// 8611h if the position is outside the window (6065h) for longer than 6066h.
 void DriveDevice::supervise_following_error() {
   if (!energised() || !brake_open()) return;
   const ObjectDictionary& od = slave_.dictionary();
@@ -511,7 +511,7 @@ void DriveDevice::on_nmt_state(NmtState from, NmtState to, std::int64_t time_ns)
   if (from == NmtState::initialising && state_ == DriveState::not_ready_to_switch_on) {
     enter(DriveState::switch_on_disabled, 1);
   }
-  // Someone took the drive out of operational while it moves: the connection is as good as lost.
+  // The drive was taken out of operational while moving: this counts as a lost connection.
   if (from == NmtState::operational) react_to_connection(slave_.dictionary().number(0x6007), emcy::communication);
 }
 

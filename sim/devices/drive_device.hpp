@@ -1,17 +1,16 @@
-// A simulated servo drive on CANopen with the CiA 402 profile: cyclic synchronous position (6060h = 8), interpolated
+// A simulated CANopen servo drive with the CiA 402 profile: cyclic synchronous position (6060h = 8), interpolated
 // position (7), cyclic synchronous torque (10).
 //
-// At each SYNC it latches the target (607Ah) that came since the last one, samples position and statusword for its
-// transmit PDO, and moves to the target within the interpolation period (60C2h): there at the following SYNC. A SYNC
-// without a new target is answered by a bounded deceleration (6085h), never by a jump; a torque (6071h, cut at 6072h)
-// acts until the next one. When SYNC, the receive PDO or the master's heartbeat fail, the drive stops by itself, from
-// a torque too:
+// At each SYNC it latches the target (607Ah) received since the last one, samples position and statusword for its
+// transmit PDO, and reaches the target within the interpolation period (60C2h), at the next SYNC. On a SYNC without a
+// new target it decelerates within a limit (6085h) and never jumps; a torque (6071h, limited by 6072h) acts until the
+// next one. The drive stops by itself, also from a torque, when one of these fails:
 //   SYNC          2010h:01 interpolation periods without one     EMCY 8700h, fault reaction 605Eh
 //   receive PDO   its event timer, 1400h:05                      EMCY 8250h, reaction 6007h
 //   heartbeat     1016h                                          EMCY 8130h, reaction 6007h, then 1029h
 //
-// Operation is refused (state stays switched on, statusword bit 7 set, reason in 2001h) while the mode isn't displayed
-// in 6061h, 60C2h isn't set or doesn't match the SYNCs seen, or the target isn't where the axis is.
+// It refuses operation (stays switched on, statusword bit 7 set, reason in 2001h) while 6061h doesn't show the mode,
+// 60C2h isn't set or doesn't match the SYNCs, or the target isn't at the actual position.
 #pragma once
 
 #include <array>
@@ -26,11 +25,11 @@
 
 namespace proxarm::sim {
 
-// Of a drive with an incremental encoder: it counts from where it was when its power came on, until it is homed (mode
-// 6) at its switch.
+// For a drive with an incremental encoder: it counts from its position at power on, until it is homed (mode 6) at its
+// switch.
 struct IncrementalEncoder {
-  std::int32_t home_counts = 0;  // of the axis, where its switch is
-  bool homed = false;            // before its power came on for us, as it were
+  std::int32_t home_counts = 0;  // axis position at the switch
+  bool homed = false;            // before this power on
 };
 
 struct DriveDeviceConfig {
@@ -41,14 +40,14 @@ struct DriveDeviceConfig {
   std::uint32_t profile_deceleration = 500'000;           // 6084h, counts/s²: slow-down ramp
   std::uint32_t rated_torque_mNm = 1000;                  // 6076h, of the motor
   std::int32_t position_min = 0, position_max = 0;        // 607Dh; equal: no limit
-  std::optional<IncrementalEncoder> incremental;          // none: absolute
-  std::int64_t brake_release_ns = 30'000'000;             // from enabling to where the target is followed
-  std::uint8_t sync_tolerance_periods = 3;                // 2010h:01; 0: not supervised
-  // Where it has something else than the profile says, as index << 8 | sub-index.
+  std::optional<IncrementalEncoder> incremental;          // nullopt: absolute encoder
+  std::int64_t brake_release_ns = 30'000'000;             // from enabling until it follows the target
+  std::uint8_t sync_tolerance_periods = 3;                // 2010h:01; 0: SYNC isn't watched
+  // Objects that differ from the profile, as index << 8 | sub-index.
   description::DriveObjects objects{};
   std::uint32_t position_target = 0x607A00, interpolated_target = 0x60C101, torque_target = 0x607100;
-  std::optional<description::GearTorque> gear_torque{};  // what it tells of its gear
-  const description::EdsFile* eds = nullptr;             // whose dictionary it has (eds_objects.hpp), or its own
+  std::optional<description::GearTorque> gear_torque{};  // how it reports its gear torque
+  const description::EdsFile* eds = nullptr;  // file of its dictionary (eds_objects.hpp); nullptr: default dictionary
 };
 
 // Why operation was refused, 2001h.
@@ -57,7 +56,7 @@ enum class RefusalReason : std::uint8_t {
   mode_not_displayed = 1,
   interpolation_period_not_set = 2,
   no_sync = 3,
-  sync_period_mismatch = 4,    // SYNCs are off 60C2h by more than 20 %, on average over eight
+  sync_period_mismatch = 4,    // average of eight SYNCs differs from 60C2h by more than 20 %
   target_far_from_actual = 5,  // by more than the following-error window
   not_operational = 6,         // NMT
 };
@@ -68,7 +67,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
 
   void power_on(std::int64_t time_ns) noexcept override;
   void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
-  // Call at least once a millisecond, after the physics has come to this time.
+  // Precondition: the physics has been advanced to this time. Call at least once a millisecond.
   void on_time(std::int64_t time_ns) noexcept override;
 
   [[nodiscard]] DriveState state() const noexcept { return state_; }
@@ -77,20 +76,20 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   [[nodiscard]] CanopenSlave& canopen() noexcept { return slave_; }
   [[nodiscard]] const CanopenSlave& canopen() const noexcept { return slave_; }
 
-  // A fault of the drive's own appears, with its EMCY code: transition 13. Stays until it is reset.
+  // A fault of the drive, with its EMCY code: transition 13. Stays until it is reset.
   void inject_fault(std::uint16_t code, std::int64_t time_ns) noexcept;
-  // 60C2h may be written while operation is enabled; a drive that is made otherwise refuses (08000022h).
+  // true: refuses to write 60C2h while operation is enabled (08000022h).
   void fix_period_while_enabled(bool fixed) noexcept { period_fixed_ = fixed; }
-  // STO is open: no power, and "switch on disabled" is left by no command.
+  // Open: no power, and no command leaves "switch on disabled".
   void open_sto(bool open) noexcept;
-  // 6061h shows the mode only while operation is enabled; statusword bit 12 never comes; 6061h shows `mode`, whatever
-  // 6060h says.
+  // show_mode_late(): 6061h shows the mode only while operation is enabled. never_say_following(): statusword bit 12
+  // stays 0. show_mode(): 6061h shows `mode` instead of 6060h.
   void show_mode_late(bool late) noexcept { shows_mode_late_ = late; }
   void never_say_following(bool on) noexcept { never_following_ = on; }
-  // Says that it follows (bit 12) only while these bits of the controlword are set.
+  // Reports that it follows (bit 12) only while these bits of the controlword are set.
   void want_controlword_bits(std::uint16_t bits) noexcept { wanted_bits_ = bits; }
   void show_mode(std::optional<std::int8_t> mode) noexcept { shown_mode_ = mode; }
-  // 60FDh, of what is wired to it.
+  // 60FDh, the inputs wired to it.
   void set_digital_inputs(std::uint32_t bits) noexcept { digital_inputs_->set(bits); }
 
  private:
@@ -128,7 +127,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void advance_homing();
   void power_on_encoder() noexcept;
   [[nodiscard]] bool homes() const noexcept;
-  // By the drive's own zero.
+  // Relative to the drive's zero.
   [[nodiscard]] std::int64_t position() const noexcept { return axis_.position_counts() - zero_counts_; }
   [[nodiscard]] std::int64_t demand() const noexcept { return axis_.demand_counts() - zero_counts_; }
   void supervise_sync();
@@ -143,13 +142,13 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   enum class HomingState : std::uint8_t { none, running, attained, failed };
   std::optional<IncrementalEncoder> incremental_;
   HomingState homing_ = HomingState::none;
-  double homing_counts_ = 0.0;             // of the axis, where homing has come to
-  std::int64_t homing_ns_ = 0;             // and when
-  std::int64_t zero_counts_ = 0;           // of the axis, where the drive counts from
-  std::array<ObjectEntry, 2> unlisted_{};  // instead of 2001h and 2010h:01 in a drive with its maker's dictionary
+  double homing_counts_ = 0.0;             // axis position of the homing motion
+  std::int64_t homing_ns_ = 0;             // time of homing_counts_
+  std::int64_t zero_counts_ = 0;           // axis position of the drive's zero
+  std::array<ObjectEntry, 2> unlisted_{};  // replace 2001h and 2010h:01 in a drive with its maker's dictionary
   std::int64_t period_ns_ = 0;             // 60C2h; 0: not set
 
-  // Entries used in every cycle
+  // Entries used in every cycle.
   ObjectEntry *controlword_ = nullptr, *statusword_ = nullptr, *target_ = nullptr, *position_ = nullptr,
               *demand_ = nullptr, *velocity_ = nullptr, *following_error_ = nullptr, *torque_ = nullptr,
               *mode_ = nullptr, *mode_display_ = nullptr, *error_code_ = nullptr, *refusal_ = nullptr,
@@ -170,8 +169,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   bool stopping_ = false;  // on a ramp that ends in after_stop_
   DriveState after_stop_ = DriveState::switch_on_disabled;
   int after_stop_transition_ = 0;
-  std::uint16_t fault_code_ = 0;  // of the fault that is latched; 0: none
-  bool target_taken_ = false;     // since power came on
+  std::uint16_t fault_code_ = 0;  // latched fault; 0: none
+  bool target_taken_ = false;     // since power on
   bool target_fresh_ = false;     // 607Ah was written since the last SYNC
   bool following_ = false;        // bit 12
   bool target_limited_ = false;   // by 607Dh or 6072h

@@ -37,13 +37,12 @@ enum class DriveCommand : std::uint8_t {
 };
 
 struct DriveTransition {
-  int number = 0;  // of CiA 402; 0: the command means nothing in this state
+  int number = 0;  // in CiA 402; 0: the command has no effect in this state
   DriveState to = DriveState::not_ready_to_switch_on;
 };
 
 [[nodiscard]] DriveCommand decode_controlword(std::uint16_t word, std::uint16_t word_before) noexcept;
-// Transitions by command: 2 to 12, 15 and 16. The others (0, 1, 13, 14, and 12 after a quick stop) happen by
-// themselves.
+// Transitions by command: 2 to 12, 15 and 16. The others (0, 1, 13, 14, and 12 after a quick stop) are automatic.
 [[nodiscard]] DriveTransition transition_for(DriveState from, DriveCommand command) noexcept;
 // Bits 0..3, 5 and 6 of the statusword.
 [[nodiscard]] std::uint16_t statusword_bits(DriveState state) noexcept;

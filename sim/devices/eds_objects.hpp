@@ -1,12 +1,11 @@
-// A simulated drive with the object dictionary that its maker's EDS or DCF file describes.
+// Gives a simulated drive the object dictionary of its maker's EDS or DCF file.
 //
-// What the network finds is then the file's: which objects there are, their data types, who may access and map them,
-// the values they start with and their limits. What the simulation does with an object stays what it is. An object of
-// which it knows nothing is kept as it is written; one that it needs and the file hasn't got is hidden, and works on
-// with the simulation's own default, as a firmware does that doesn't show it.
+// The file then determines objects, data types, access, mapping, default values and limits. The simulation's use of an
+// object doesn't change. Objects unknown to the simulation are only stored. Objects that it needs but the file lacks
+// are hidden and keep the simulation's default, as in a firmware that doesn't show them.
 //
-// Not from the file, because a drive is given it when it is built into a machine, or measures it: position limits
-// (607Dh), rated torque (6076h), and whatever changes by itself, such as the statusword.
+// Not taken from the file: values set at installation or measured. These are position limits (607Dh), rated torque
+// (6076h), and values that change by themselves, such as the statusword.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +15,7 @@
 
 namespace proxarm::sim {
 
-// Before the device's first power on. `node` is what $NODEID stands for.
+// Call before the first power on. `node` replaces $NODEID.
 void take_over(const description::EdsFile& eds, std::uint8_t node, ObjectDictionary& dictionary);
 
 }  // namespace proxarm::sim

@@ -1,7 +1,7 @@
-// The person's enabling switch in a simulation: when it is pressed, and its message where it has one of its own.
+// The simulated person's enabling switch: the times at which it is pressed, and its message if it has one.
 //
-// Times count from the first SYNC on the cell's buses (from power on where no drive is on CAN); a second without SYNC
-// ends a session, and the next one begins them anew. Until it is pressed the first time it is let go.
+// Times count from the first SYNC on the cell's buses (from power on if no drive is on CAN). A second without SYNC ends
+// a session; the next one starts the times again. Before the first span the switch is released.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace proxarm::sim {
 
-// A switch with two positions is pressed meanwhile; one with three is in its middle position, or squeezed through.
+// During a span, a switch with two positions is pressed; one with three is in its middle position, or squeezed.
 struct PressedSpan {
   std::int64_t from_ns = 0;
   std::int64_t until_ns = INT64_MAX;
@@ -25,15 +25,15 @@ struct PressedSpan {
 
 class EnablingSwitch final : public BusDevice {
  public:
-  // `port` carries its message; null: it is wired to a drive. No span: pressed from 0.1 s on.
+  // `port` carries its message; null: wired to a drive. Without spans, pressed from 0.1 s on.
   EnablingSwitch(const description::EnablingInputDescription& input, std::vector<PressedSpan> spans, DevicePort* port);
 
   void on_sync(std::int64_t time_ns) noexcept;
-  // Where no SYNC will ever come.
+  // For cells without SYNC.
   void begin_without_sync(std::int64_t time_ns) noexcept;
   [[nodiscard]] bool pressed() const noexcept { return pressed_; }
   [[nodiscard]] bool squeezed() const noexcept { return squeezed_; }
-  // What it makes of the drive's object; bits that aren't its own are zero.
+  // Its bits in the drive's object; other bits are 0.
   [[nodiscard]] std::uint32_t digital_inputs() const noexcept;
 
   void power_on(std::int64_t time_ns) noexcept override;
@@ -42,7 +42,7 @@ class EnablingSwitch final : public BusDevice {
 
  private:
   void send(std::int64_t time_ns) noexcept;
-  // Each contact with its bit, counted from bit 0 of byte 0 of the message, or of the object.
+  // Each contact at its bit, counted from bit 0 of byte 0 of the message or object.
   [[nodiscard]] std::uint64_t contacts() const noexcept;
 
   description::EnablingInputDescription input_;

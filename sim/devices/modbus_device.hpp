@@ -1,10 +1,9 @@
-// A simulated drive on a Modbus line: holding registers as its description lays them out, and an axis that goes where
-// the last command sent it, at the speed that came with it.
+// A simulated drive on a Modbus line: holding registers as in its description, and an axis that moves to the last
+// command's position at its speed.
 //
-// serve() may be called by a server's thread at any time; on_time() by the physics' own, at least once a millisecond.
-// The axis is driven while the control word says so, or, of a drive without one, always. Without a request for the
-// setting "communication timeout" (milliseconds; 0: not supervised) it stops by itself and stays stopped until it is
-// switched off and on again.
+// A server's thread may call serve() at any time; the physics' thread calls on_time() at least once a millisecond. The
+// axis is driven while the control word requests it; without a control word, always. If no request comes for the
+// setting "communication timeout" (ms; 0: not watched), the drive stops until it is switched off and on again.
 #pragma once
 
 #include <cstdint>
@@ -22,28 +21,28 @@ namespace proxarm::sim {
 // Exception codes of a Modbus server.
 inline constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal_value = 3;
 
-// What may be wrong with its answers.
+// Faults of its answers; VALUE as in device_fault.hpp.
 enum class ModbusFault : std::uint8_t {
   none,
-  exception,       // VALUE, such as 04, server device failure
-  silent,          // no answer
-  lost,            // one of VALUE requests has no answer
-  late,            // the answer comes VALUE milliseconds later; on a real line only
-  closed,          // the connection is closed
-  wrong_unit,      // the answer bears the next unit's number
-  wrong_function,  // the answer bears another function's
-  wrong_count,     // the answer says that it has a register less than it has
-  half,            // the answer ends in its middle
-  low_word_first,  // values in two registers have their words in the other order than the file says
-  forgets,         // settings are acknowledged and not kept
-  no_function_23,  // that function is answered by exception 01
-  not_ready,       // the status never says that it is ready, nor that it is driven
-  not_driven,      // the status never says that it is driven
-  tripped,         // the status says that it has a fault
+  exception,
+  silent,
+  lost,  // one of VALUE requests gets no answer
+  late,  // the answer is VALUE ms late; only on a real line
+  closed,
+  wrong_unit,      // the next unit's number
+  wrong_function,  // another function code
+  wrong_count,     // announces one register less
+  half,            // cut in half
+  low_word_first,  // words in the opposite order of the file
+  forgets,         // acknowledges settings without storing them
+  no_function_23,  // answers function 23 with exception 01
+  not_ready,       // status never shows ready or driven
+  not_driven,      // status never shows driven
+  tripped,         // status shows a fault
   echo,            // RTU: its adapter echoes each request before the answer
 };
 
-// What answers on a Modbus line.
+// A device that answers on a Modbus line.
 class ModbusUnit {
  public:
   ModbusUnit() = default;
@@ -52,7 +51,7 @@ class ModbusUnit {
   virtual ~ModbusUnit() = default;
 
   [[nodiscard]] virtual std::uint8_t unit() const noexcept = 0;
-  // Unit and PDU of a request to this unit; the answer's, empty where there is none.
+  // Takes unit and PDU of a request to this unit; returns those of the answer, or nothing for no answer.
   [[nodiscard]] virtual std::vector<std::uint8_t> serve(std::span<const std::uint8_t> request) = 0;
   [[nodiscard]] virtual ModbusFault fault() const noexcept = 0;
   [[nodiscard]] virtual int late_ms() const noexcept { return 0; }
@@ -94,7 +93,7 @@ class ModbusDevice final : public ModbusUnit {
   double deceleration_;
   ServoAxis& axis_;
   mutable std::mutex mutex_;
-  std::unordered_map<unsigned, std::uint16_t> bank_;  // the registers that there are
+  std::unordered_map<unsigned, std::uint16_t> bank_;  // the existing registers
   ModbusFault fault_ = ModbusFault::none;
   std::uint32_t fault_value_ = 0, requests_ = 0;
   bool commanded_ = false, requested_ = false, enabled_ = false, timed_out_ = false;

@@ -1,7 +1,7 @@
-// A simulated force sensor on a Modbus line: the sample of a DescribedDevice, as holding registers.
+// A simulated force sensor on a Modbus line: offers the samples of a DescribedDevice as holding registers.
 //
-// send() takes what the device has sampled, by the physics' thread; serve() may be called by a server's thread at any
-// time. A sensor that is silent doesn't answer.
+// The physics' thread calls send() with a sample; a server's thread may call serve() at any time. A silent sensor
+// doesn't answer.
 #pragma once
 
 #include <array>

@@ -23,8 +23,8 @@ namespace {
 using description::ModbusLineDescription;
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr int look_up_ms = 20;         // how often the threads look whether they shall end
-constexpr std::size_t mbap_bytes = 6;  // transaction, protocol, length; then the unit and the PDU
+constexpr int look_up_ms = 20;         // how often the threads check whether to end
+constexpr std::size_t mbap_bytes = 6;  // transaction, protocol, length; unit and PDU follow
 
 description::SetupError problem(const ModbusLineDescription& line, const std::string& what) {
   return description::SetupError({.bus = line.name, .message = what, .found = std::strerror(errno)});
@@ -42,7 +42,7 @@ std::uint16_t crc16(const Bytes& bytes) noexcept {
   return crc.checksum();
 }
 
-// Bytes of a request on a serial line with its checksum, as far as it can be told yet; 0: not yet.
+// Bytes of a serial request with its checksum; 0 if not yet known.
 std::size_t rtu_request_size(const Bytes& bytes) noexcept {
   if (bytes.size() < 2) return 0;
   if (bytes[1] == 16) return bytes.size() < 7 ? 0 : 9U + bytes[6];
@@ -105,7 +105,7 @@ void ModbusServer::serve_tcp() noexcept {
   }
 }
 
-// One request; false when the connection is at its end.
+// Serves one request; false at the end of the connection.
 bool ModbusServer::serve_connection(int connection) noexcept {
   if (!readable(connection)) {
     for (const ModbusUnit* device : devices_) {
@@ -126,7 +126,7 @@ bool ModbusServer::serve_connection(int connection) noexcept {
     if (answer.empty()) return true;
     usleep(1000U * static_cast<unsigned>(device->late_ms()));
     Bytes reply(header.begin(), header.end());
-    // Half an answer announces the whole.
+    // Half an answer announces its full length.
     const std::size_t announced = device->fault() == ModbusFault::half ? 2 * answer.size() : answer.size();
     reply[4] = static_cast<std::uint8_t>(announced >> 8);
     reply[5] = static_cast<std::uint8_t>(announced);
@@ -163,14 +163,14 @@ void ModbusServer::open_terminal(const ModbusLineDescription& line) {
 void ModbusServer::serve_terminal() noexcept {
   Bytes received;
   while (!stop_.load()) {
-    // A pause ends whatever has begun: what comes after it is another request.
+    // A pause ends an incomplete request; the following bytes begin another one.
     if (!readable(terminal_fd_)) {
       received.clear();
       continue;
     }
     std::array<std::uint8_t, 256> chunk{};
     const ssize_t count = read(terminal_fd_, chunk.data(), chunk.size());
-    if (count <= 0) {  // nobody has the other end open
+    if (count <= 0) {  // the other end isn't open
       usleep(1000 * look_up_ms);
       continue;
     }
@@ -179,7 +179,7 @@ void ModbusServer::serve_terminal() noexcept {
     if (size == 0 || received.size() < size) continue;
     Bytes request(received.begin(), received.begin() + static_cast<std::ptrdiff_t>(size));
     received.clear();
-    if (crc16(request) != 0) continue;  // over a message with its checksum
+    if (crc16(request) != 0) continue;  // 0 over a message with its checksum
     for (ModbusUnit* device : devices_) {
       if (device->unit() != request[0]) continue;
       if (device->fault() == ModbusFault::echo && write(terminal_fd_, request.data(), size) < 0) break;

@@ -1,5 +1,5 @@
-// Simulated Modbus drives on a real line: a TCP port of the loopback interface, or a pseudo-terminal for RTU. Framing,
-// checksums and the wait for requests are libmodbus'; one thread serves one master.
+// Serves simulated Modbus devices on a real line: a TCP port of the loopback interface, or a pseudo-terminal for RTU.
+// libmodbus does framing, checksums and waiting; one thread serves one master.
 #pragma once
 
 #include <atomic>
@@ -14,8 +14,8 @@ namespace proxarm::sim {
 
 class ModbusServer {
  public:
-  // Opens the line and serves until it is destroyed. `line.host` must be a loopback address (port 0: any that is free);
-  // for a serial line a pseudo-terminal is made and `line.device` becomes a symbolic link to it, if it isn't empty.
+  // Opens the line and serves it until destruction. `line.host` must be a loopback address (port 0: any free port). For
+  // a serial line, creates a pseudo-terminal and, if `line.device` isn't empty, makes that a symbolic link to it.
   // Throws SetupError. The devices must outlive the server.
   ModbusServer(const description::ModbusLineDescription& line, std::vector<ModbusUnit*> devices);
   ModbusServer(const ModbusServer&) = delete;

@@ -21,14 +21,14 @@ using models::Vec3;
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using MujocoJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, models::most_rows>;
 
-// Mechanical end stops sit this far past the URDF's limits (software limits come first): 3 degrees.
+// Mechanical end stops are this far beyond the URDF's limits, so that software limits act first: 3 degrees.
 constexpr double end_stop_margin_rad = 0.05;
-// A gear given as rigid (stiffness 0) is as stiff as the step allows: 200 Hz against its own link's inertia.
+// A gear given as rigid (stiffness 0) is as stiff as the step allows: 200 Hz with its link's inertia.
 constexpr double rigid_gear_rad_per_s = 2.0 * M_PI * 200.0;
-// Symplectic Euler is unstable from ωh = 2 on; damping and rotors bring that down a little.
+// Symplectic Euler is unstable from ωh = 2 on; damping and rotors lower that a little.
 constexpr double largest_phase_step = 1.5;
 
-// Of step_share(), at the start: the masses at the tip of the arm change by less than a third on its way.
+// For step_share() at the start: while the arm moves, the masses at its tip change by less than a third.
 constexpr double largest_step_share = 0.75;
 
 Mat3 inertia_matrix(const std::array<double, 6>& i) {
@@ -42,8 +42,8 @@ Mat3 inertia_matrix(const std::array<double, 6>& i) {
 struct ArmDynamics::Links {
   ModelPointer model;
   DataPointer data;
-  int body = 0;     // the sensor's link
-  Pose X_LS, X_LT;  // L: the sensor's link
+  int body = 0;     // sensor's link
+  Pose X_LS, X_LT;  // L: sensor's link
   RowMat3 R_BL = RowMat3::Identity();
   Vec3 p_BL = Vec3::Zero();
   Vec3 arm_B = Vec3::Zero();                   // from L's origin to T's, in B
@@ -160,8 +160,8 @@ void ArmDynamics::reset(std::span<const double> joint_rad) {
   apply(torque, Vec3::Zero());
 }
 
-// Symplectic Euler: v(t+h) = v(t) + h a(t), then q(t+h) = q(t) + h v(t+h). The rotor, by (b), with its friction taken
-// at t+h: it stops within the step, and stays stopped, if friction can do that.
+// Symplectic Euler: v(t+h) = v(t) + h a(t), then q(t+h) = q(t) + h v(t+h). The rotor follows (b), with its friction at
+// t+h: it stops within the step, and stays stopped, if friction suffices.
 void ArmDynamics::advance() noexcept {
   mjData& d = *links_->data;
   const double h = step_s_;
@@ -197,7 +197,7 @@ void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& han
   update_accelerations();
 }
 
-// (d), for a step of δ: with s its sense, z goes from where it is towards s z_m by exp(−|step|/w).
+// (d), for one step of δ: with s its sign, z approaches s z_m by the factor exp(−|step|/w).
 void ArmDynamics::rub(Axis& axis) noexcept {
   const double windup = axis.angle_rad - links_->data->qpos[axis.dof], step = windup - axis.windup_rad;
   axis.windup_rad = windup;
@@ -231,7 +231,7 @@ void ArmDynamics::update_kinematics() noexcept {
   l.R_BL = Eigen::Map<const RowMat3>(d->xmat + 9 * l.body);
   l.p_BL = Eigen::Map<const Vec3>(d->xpos + 3 * l.body);
   l.arm_B = l.R_BL * l.X_LT.translation();
-  std::array<double, 6> twist{};  // rotation first
+  std::array<double, 6> twist{};  // angular part first
   mj_objectVelocity(m, d, mjOBJ_XBODY, l.body, twist.data(), 0);
   const Vec3 omega_B(twist.data()), v_B(twist.data() + 3);
   const Mat3 R_WB = X_WB_.linear();
@@ -241,7 +241,7 @@ void ArmDynamics::update_kinematics() noexcept {
   tool_.angular_velocity_W = R_WB * omega_B;
 }
 
-// (a). The hand's weight is carried by the person: what MuJoCo lets gravity do to it is taken back.
+// (a). The person carries the hand's weight, so MuJoCo's gravity on the hand is compensated.
 void ArmDynamics::update_accelerations() noexcept {
   Links& l = *links_;
   const mjModel* m = l.model.get();
@@ -263,14 +263,14 @@ void ArmDynamics::update_accelerations() noexcept {
   update_tool_acceleration();
 }
 
-// The sensor, about S's origin: handle (mass m, centre of mass C) and hand (m_h at T) follow the arm, so the load they
-// put on it is what acts on them less what they need to move:
+// The sensor's load, about S's origin. Handle (mass m, centre of mass C) and hand (m_h at T) follow the arm, so their
+// load is the force that acts on them less the force that accelerates them:
 //   F = F_hand − m_h a_T + m (g − a_C)
 //   τ = r_T × (F_hand − m_h a_T) + (τ_hand − I_h α) + r_C × m (g − a_C) − (I α + ω × I ω)
 void ArmDynamics::update_tool_acceleration() noexcept {
   const Links& l = *links_;
   mj_rnePostConstraint(l.model.get(), l.data.get());
-  std::array<double, 6> a{};  // rotation first; of L's origin, less gravity
+  std::array<double, 6> a{};  // angular part first; of L's origin, less gravity
   mj_objectAcceleration(l.model.get(), l.data.get(), mjOBJ_XBODY, l.body, a.data(), 0);
   const Mat3 R_WB = X_WB_.linear();
   const Vec3 alpha_W = R_WB * Vec3(a.data());
@@ -303,8 +303,8 @@ double ArmDynamics::joint_speed_rad_per_s(std::size_t axis) const noexcept {
   return links_->data->qvel[axes_[axis].dof];
 }
 
-// −∂/∂φ of the work of gravity: Σ over bodies behind the joint of (axis × lever) · (−m g); of a joint that slides,
-// axis · (−m g).
+// −∂/∂φ of the work of gravity: Σ over bodies behind the joint of (axis × lever) · (−m g); for a prismatic joint, axis
+// · (−m g).
 double ArmDynamics::static_torque_Nm(std::size_t axis) const noexcept {
   const mjModel* m = links_->model.get();
   const mjData* d = links_->data.get();
@@ -364,13 +364,13 @@ double ArmDynamics::step_share() const {
   const Eigen::Index n = m->nv;
   models::SmallMatrix links(n, n);
   mj_fullM(m, links.data(), links_->data->qM);
-  // Links first, rotors behind them; a gear is between one of each.
+  // Links first, then rotors; each gear connects one link and one rotor.
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(2 * n, 2 * n), F = M;
   M.topLeftCorner(n, n) = links;
   for (const Axis& axis : axes_) {
     const Eigen::Index link = axis.dof, rotor = n + axis.dof;
     M(rotor, rotor) = axis.rotor_inertia_kg_m2;
-    // Where its motion turns, a gear with hysteresis is twice as stiff: k/2 (1 + 1) by (d) beside k.
+    // When its motion reverses, a gear with hysteresis is twice as stiff: k plus k/2 (1 + 1) by (d).
     const double stiffest = (axis.hysteresis_rad > 0.0 ? 2.0 : 1.0) * axis.stiffness_Nm_per_rad;
     const double gear = step_s_ * step_s_ * stiffest + 2.0 * step_s_ * axis.damping_Nms_per_rad;
     F(link, link) += gear;

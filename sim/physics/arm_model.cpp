@@ -51,7 +51,7 @@ void remove_children(tinyxml2::XMLElement& parent, const char* name) {
   while (auto* child = parent.FirstChildElement(name)) parent.DeleteChild(child);
 }
 
-// MuJoCo ignores <mimic> in silence, and its shapes are of no use here (meshes would only be more files to miss).
+// MuJoCo silently ignores <mimic>. Its shapes aren't needed, and meshes would only be further files to miss.
 void refuse_and_strip(const Cell& cell, tinyxml2::XMLElement& robot) {
   for (auto* joint = robot.FirstChildElement("joint"); joint; joint = joint->NextSiblingElement("joint")) {
     if (const auto* mimic = joint->FirstChildElement("mimic")) {
@@ -72,7 +72,7 @@ void refuse_and_strip(const Cell& cell, tinyxml2::XMLElement& robot) {
 struct Payload {
   const char* name;
   std::string parent;
-  description::PoseDescription pose;  // in the parent
+  description::PoseDescription pose;  // in the parent's frame
   double mass_kg;
   std::array<double, 3> centre_of_mass_m;
   std::array<double, 6> inertia_kg_m2;  // ixx iyy izz ixy ixz iyz
@@ -99,7 +99,7 @@ void add_payload(tinyxml2::XMLElement& robot, const Payload& payload) {
   origin->SetAttribute("rpy", numbers(payload.pose.rpy_rad.data(), 3).c_str());
 }
 
-// MuJoCo wants an inertia above zero: 0.4 m r² of a ball of 1 mm, 1e-5 of the smallest inertia of a wrist.
+// MuJoCo needs an inertia above zero: 0.4 m r² of a ball of 1 mm, 1e-5 of the smallest inertia of a wrist.
 std::array<double, 6> point_inertia(double mass_kg, double inertia_kg_m2 = 0.0) {
   const double i = std::max(inertia_kg_m2, 0.4e-6 * mass_kg);
   return {i, i, i, 0.0, 0.0, 0.0};
@@ -157,7 +157,7 @@ ModelPointer load_links(const Cell& cell, double hand_mass_kg, double hand_inert
   refuse_and_strip(cell, *robot);
   require_link(cell, *robot);
   add_payloads(cell, hand_mass_kg, hand_inertia_kg_m2, *robot);
-  // Without fusestatic="false" MuJoCo merges the links behind fixed joints, and with them the flange.
+  // Without fusestatic="false", MuJoCo merges links behind fixed joints, and the flange with them.
   auto* compiler = document.NewElement("mujoco");
   compiler->InsertNewChildElement("compiler")->SetAttribute("fusestatic", "false");
   robot->InsertFirstChild(compiler);

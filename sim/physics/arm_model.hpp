@@ -1,4 +1,4 @@
-// From a cell's URDF to MuJoCo's model of the links: the loader behind ArmDynamics.
+// Builds MuJoCo's model of the links from a cell's URDF, for ArmDynamics.
 #pragma once
 
 #include <mujoco/mujoco.h>
@@ -16,8 +16,8 @@ struct MujocoDelete {
 using ModelPointer = std::unique_ptr<mjModel, MujocoDelete>;
 using DataPointer = std::unique_ptr<mjData, MujocoDelete>;
 
-// The links of the URDF, with the handle and the hand's point mass fixed to the sensor's link, in the base's frame
-// (gravity turned into it). Shapes are left out: nothing collides here. Throws description::SetupError.
+// The links of the URDF, with the handle and the hand's point mass fixed to the sensor's link, in the base frame
+// (gravity turned into it). Without shapes, as nothing collides here. Throws description::SetupError.
 ModelPointer load_links(const description::Cell& cell, double hand_mass_kg, double hand_inertia_kg_m2 = 0.0);
 
 }  // namespace proxarm::sim

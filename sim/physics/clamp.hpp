@@ -1,7 +1,7 @@
-// A body that is caught between the tool and something that doesn't give way: a spring that only pushes.
+// A body clamped between the tool and a rigid obstacle, modelled as a spring that only pushes:
 //
 //   F = −k max(0, (p − p₀)·n) n   on the tool at T (p), with n into the body
-// No damping, no friction and no mass: all the energy that goes in, k x²/2, is stored.
+// Without damping, friction or mass: it stores all the energy put into it, k x²/2.
 #pragma once
 
 #include <algorithm>
@@ -11,10 +11,10 @@
 namespace proxarm::sim {
 
 struct Clamp {
-  models::Vec3 surface_W = models::Vec3::Zero();  // p₀, where the tool meets it
-  models::Vec3 normal_W = models::Vec3::UnitX();  // n, of length 1
+  models::Vec3 surface_W = models::Vec3::Zero();  // p₀, point of first contact
+  models::Vec3 normal_W = models::Vec3::UnitX();  // n, unit vector
   double stiffness_N_per_m = 0.0;
-  bool felt = true;  // it presses on the handle, so the sensor feels it; else on the arm in front of the sensor
+  bool felt = true;  // it presses on the handle, so the sensor measures it; false: on the arm before the sensor
 
   [[nodiscard]] double depth_m(const models::Vec3& tool_W) const noexcept {
     return std::max(0.0, (tool_W - surface_W).dot(normal_W));

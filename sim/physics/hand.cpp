@@ -12,7 +12,7 @@ using models::Vec3;
 
 namespace {
 
-constexpr double small_rad = 1e-4;  // the next term of each series below is smaller by small_rad²/20 or more
+constexpr double small_rad = 1e-4;  // the next term of each series below is smaller by a factor of small_rad²/20
 
 // ω of R = exp([φ]ₓ):  ω = φ̇ + (1 − cos θ)/θ² φ × φ̇ + (θ − sin θ)/θ³ φ × (φ × φ̇), θ = |φ|
 Vec3 angular_velocity(const Vec3& phi, const Vec3& rate) noexcept {
@@ -56,7 +56,7 @@ namespace {
 
 Vec3 value_of(const description::TimedVector& row) { return Vec3(row.value.data()); }
 
-// The slope at a row of the parabola through it and its neighbours; at rest at both ends.
+// The slope, at a row, of the parabola through it and its neighbours; 0 at both ends.
 //   ẋ_i = (v₁ d₀ + v₀ d₁)/(d₀ + d₁),   v₀ = (x_i − x_{i−1})/d₀,  v₁ = (x_{i+1} − x_i)/d₁
 Vec3 slope(const std::vector<description::TimedVector>& rows, std::size_t i) {
   if (i == 0 || i + 1 == rows.size()) return Vec3::Zero();
@@ -66,7 +66,7 @@ Vec3 slope(const std::vector<description::TimedVector>& rows, std::size_t i) {
   return (v1 * d0 + v0 * d1) / (d0 + d1);
 }
 
-// The first row after this time; as many as there are after the last.
+// Index of the first row after this time; the number of rows if there is none.
 std::size_t row_after(const std::vector<description::TimedVector>& rows, double time_s) {
   const auto next =
       std::upper_bound(rows.begin(), rows.end(), time_s, [](double t, const auto& row) { return t < row.time_s; });
@@ -98,13 +98,12 @@ Vec3 Hand::data_force_W(double time_s) const noexcept {
   if (rows.empty() || time_s > rows.back().time_s) return Vec3::Zero();
   const std::size_t next = row_after(rows, time_s);
   if (next == 0) return Vec3::Zero();
-  if (next == rows.size()) return value_of(rows.back());  // at the last row's very time
+  if (next == rows.size()) return value_of(rows.back());  // exactly at the last row's time
   const double s = (time_s - rows[next - 1].time_s) / (rows[next].time_s - rows[next - 1].time_s);
   return (1.0 - s) * value_of(rows[next - 1]) + s * value_of(rows[next]);
 }
 
-// On top of where it is led comes Σ a_j d_j sin(2π f_j t + φ_j), from its own time zero on (before, it rests where that
-// begins).
+// The multisine is added: Σ a_j d_j sin(2π f_j t + φ_j), from time zero on; before, it rests at its start.
 Intention Hand::intention(double time_s) const noexcept {
   Intention result;
   result.position_W = start_W_;
@@ -124,8 +123,8 @@ Intention Hand::intention(double time_s) const noexcept {
 }
 
 namespace {
-// Evenly distributed between −1 and 1, the same for the same two numbers: SplitMix64's last step (Steele, Lea, Flood,
-// "Fast splittable pseudorandom number generators", 2014), and 53 of its bits.
+// Uniform between −1 and 1, a function of both numbers: SplitMix64's last step (Steele, Lea, Flood, "Fast splittable
+// pseudorandom number generators", 2014), and 53 of its bits.
 double drawn(std::uint64_t seed, std::uint64_t number) noexcept {
   std::uint64_t z = (seed << 32) + (number + 1) * 0x9E3779B97F4A7C15U;
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;

@@ -1,12 +1,12 @@
-// The person's hand in a simulation: it holds the handle through stiffness and damping and follows an intention.
+// The person's hand in simulation: holds the handle by a spring and a damper, and follows an intended motion.
 //
-//   F = K (x_int(t) − x) + D (ẋ_int(t) − ẋ) + F_data(t),   cut to max_force_N along itself
-// acts on hand and handle at T; x_int is the intention of description::HandDescription from where the tool was at the
-// start. Between the rows of a trajectory, x_int is a cubic through their places with the slopes of parabolas through
-// three of them (Hermite); F_data is straight between those of a force. With a grip on the orientation,
-//   τ = K_r log(R_int(t) Rᵀ) + D_r (ω_int(t) − ω),   R_int = exp([φ(t)]ₓ) R_start,   cut to max_torque_Nm along itself
-// acts as well. K, D, K_r and D_r vary together, where the description says so. The hand's mass and inertia belong to
-// ArmDynamics.
+//   F = K (x_int(t) − x) + D (ẋ_int(t) − ẋ) + F_data(t),   norm limited to max_force_N
+// acts on hand and handle at T. x_int is the intention of description::HandDescription, relative to the tool's start.
+// Between the rows of a trajectory, x_int is a cubic Hermite spline with the slopes of parabolas through three rows;
+// F_data is interpolated linearly. With a grip on the orientation,
+//   τ = K_r log(R_int(t) Rᵀ) + D_r (ω_int(t) − ω),   R_int = exp([φ(t)]ₓ) R_start,   norm limited to max_torque_Nm
+// acts as well. K, D, K_r and D_r vary together if the description says so. ArmDynamics has the hand's mass and
+// inertia.
 #pragma once
 
 #include "models/description/hand.hpp"
@@ -17,16 +17,16 @@ namespace proxarm::sim {
 struct Intention {
   models::Vec3 position_W = models::Vec3::Zero();
   models::Vec3 velocity_W = models::Vec3::Zero();
-  models::Vec3 turn_W = models::Vec3::Zero();       // φ, a rotation vector from the orientation of the start
+  models::Vec3 turn_W = models::Vec3::Zero();       // φ, rotation vector from the start orientation
   models::Vec3 turn_rate_W = models::Vec3::Zero();  // dφ/dt
 };
 
 class Hand {
  public:
-  // `start_W`: the pose of T at the start.
+  // `start_W`: pose of T at the start.
   Hand(const description::HandDescription& description, const models::Pose& start_W);
 
-  // What the hand wants at this time, in seconds of its own clock; before 0 it rests at its first waypoint.
+  // `time_s`: on the hand's clock; before 0 the hand rests at its first waypoint.
   [[nodiscard]] Intention intention(double time_s) const noexcept;
   [[nodiscard]] models::Vec3 force_W(double time_s, const models::Vec3& position_W,
                                      const models::Vec3& velocity_W) const noexcept;
@@ -37,7 +37,7 @@ class Hand {
 
  private:
   [[nodiscard]] description::Grip grip(double time_s) const noexcept;
-  [[nodiscard]] double variation(double time_s) const noexcept;  // a factor of the grip
+  [[nodiscard]] double variation(double time_s) const noexcept;  // factor of the grip
   void add_waypoints(double time_s, Intention& want) const noexcept;
   void add_trajectory(double time_s, Intention& want) const noexcept;
   [[nodiscard]] models::Vec3 data_force_W(double time_s) const noexcept;

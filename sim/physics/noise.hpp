@@ -1,11 +1,11 @@
-// Noise of simulated sensors that depends on a key only: not on when, or how often, somebody asks.
+// Noise for simulated sensors that depends on a key only, not on when or how often it is read.
 #pragma once
 
 #include <cstdint>
 
 namespace proxarm::sim {
 
-// splitmix64: a good mixer with a counter as its state, so that any sample's noise can be had without those before it.
+// splitmix64: mixes a counter well, so any sample's noise can be computed without the samples before it.
 inline std::uint64_t mixed(std::uint64_t x) noexcept {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
@@ -13,8 +13,8 @@ inline std::uint64_t mixed(std::uint64_t x) noexcept {
   return x ^ (x >> 31);
 }
 
-// Close to a standard normal deviate: the sum of 12 uniform numbers of 16 bits, each with variance 1/12 (less 2^-32
-// of it). No logarithms: the same bits on every machine. Ends at ±6, kurtosis 2.9.
+// Approximately standard normal: the sum of 12 uniform numbers of 16 bits, each of variance 1/12 (relative error
+// 2^-32). Without logarithms, so bits are equal on every machine. Ends at ±6, kurtosis 2.9.
 inline double normal(std::uint64_t key) noexcept {
   std::int64_t sum = 0;
   for (std::uint64_t i = 0; i < 3; ++i) {

@@ -1,6 +1,6 @@
-// Everything at the far end of the wire that obeys physics: arm, servo loops, force sensor and hand, on one clock.
+// All the simulated physics on one clock: arm, servo loops, force sensor and hand.
 //
-// The devices on the bus (CANopen slaves, the sensor's protocol) sit on top: they call advance_to() with the time of a
+// The devices on the bus use it (CANopen slaves, the sensor's protocol): they call advance_to() with the time of a
 // frame, then read encoders and gauges and set targets. Knows no bus.
 #pragma once
 
@@ -23,34 +23,33 @@
 
 namespace proxarm::sim {
 
-// The step of the mechanics is the shortest servo period of the cell (servo_rate_Hz), 0.25 ms by default.
+// The mechanics' step is the cell's shortest servo period (servo_rate_Hz), 0.25 ms by default, divided by `finer`.
 struct PlantConfig {
-  std::int64_t finer = 1;  // steps of the mechanics in the shortest servo period; more is slower and more accurate
+  std::int64_t finer = 1;  // more is slower and more accurate
   std::uint64_t noise_seed = 1;
 };
 
-// In N, on the handle, at this time of the hand's own clock (negative never; 0 until it starts), where the tool is and
-// as fast as it is. Called each step.
+// Force on the handle in N, called each step. time_s is on the hand's clock: 0 until it starts, never negative.
 using HandForce =
     std::function<models::Vec3(double time_s, const models::Vec3& position_W, const models::Vec3& velocity_W)>;
 
 class Plant {
  public:
-  // At rest in the cell's start pose, brakes closed, drives off, at start_ns of the network's clock.
-  // Throws description::SetupError (see ArmDynamics, ForceSensorModel; servo rates whose periods aren't whole
-  // nanoseconds, or no multiples of the shortest).
+  // Starts at rest in the cell's start pose, brakes closed, drives off, at start_ns of the network's clock. Throws
+  // description::SetupError (see ArmDynamics, ForceSensorModel; also for servo periods that aren't whole nanoseconds,
+  // or no multiples of the shortest).
   Plant(const description::Cell& cell, const description::SensorDescription& sensor,
         const description::HandDescription& hand, std::int64_t start_ns = 0, const PlantConfig& config = {});
 
-  // Runs all steps up to this time (the state then is that of the last step's end, less than step_ns() before). Never
-  // goes back. noexcept, no allocation.
+  // Runs all steps up to this time; the state is then that of the last step, less than step_ns() before. Never goes
+  // back. noexcept, no allocation.
   void advance_to(std::int64_t time_ns) noexcept;
-  [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }  // of the state
+  [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }  // time of the state
 
   [[nodiscard]] std::size_t axis_count() const noexcept { return servos_.size(); }
   [[nodiscard]] std::int64_t step_ns() const noexcept { return step_ns_; }
-  // A brake opens when its servo is enabled and closes when it is disabled, brake_delay_s later: a servo that is
-  // disabled by itself gives no torque meanwhile.
+  // A brake opens when its servo is enabled, and closes brake_delay_s after it is disabled. In between, a servo that
+  // was disabled by disable() gives no torque.
   [[nodiscard]] ServoLoop& servo(std::size_t axis) noexcept { return servos_[axis]; }
   void enable(std::size_t axis, std::int64_t time_ns) noexcept {
     brakes_[axis].closes_in_ns = 0;
@@ -58,11 +57,11 @@ class Plant {
   }
   [[nodiscard]] const ServoLoop& servo(std::size_t axis) const noexcept { return servos_[axis]; }
   [[nodiscard]] const ForceSensorModel& force_sensor() const noexcept { return force_sensor_; }
-  // What measures an axis' gear reads; 0 where nothing does.
+  // Reading of the axis' gear torque sensor; 0 if it has none.
   [[nodiscard]] std::int32_t gear_torque_counts(std::size_t axis) const noexcept {
     return gear_torques_[axis] ? gear_torques_[axis]->counts() : 0;
   }
-  // From now on it repeats its last reading, or no longer does; false: this axis has none.
+  // Makes that sensor repeat its last reading, or ends that; false if the axis has none.
   bool stick_gear_torque(std::size_t axis, bool stuck) noexcept {
     if (gear_torques_[axis]) gear_torques_[axis]->stick(stuck);
     return gear_torques_[axis].has_value();
@@ -72,32 +71,32 @@ class Plant {
   [[nodiscard]] const ArmDynamics& arm() const noexcept { return arm_; }
   [[nodiscard]] const Hand& hand() const noexcept { return hand_; }
 
-  // The hand's clock starts (its intention's time zero) when all drives are enabled for the first time, or here.
+  // Starts the hand's clock (time zero of its intention), which otherwise starts when all drives are first enabled.
   void start_hand(std::int64_t time_ns) noexcept;
   [[nodiscard]] bool hand_started() const noexcept { return hand_started_; }
   [[nodiscard]] std::int64_t hand_start_ns() const noexcept { return hand_start_ns_; }
 
-  // Switches a servo off as a drive does that commands its brake: one whose setpoint rests holds the axis until the
-  // brake has closed, any other loses its torque at once. Enabling it takes that back.
+  // Switches a servo off as a drive does that controls its brake: if its setpoint rests, it holds the axis until the
+  // brake has closed, else its torque ends at once. Enabling it cancels this.
   void switch_off(std::size_t axis) noexcept;
 
-  // From now on there is a body in the tool's way.
+  // Puts a body into the tool's way from now on.
   void set_clamp(const Clamp& clamp) noexcept { clamp_ = clamp; }
 
-  // From now on the hand pulls so; of its description only its mass counts. Precondition: `force` doesn't throw.
+  // Replaces the hand's force from now on; its description then only gives the mass. Precondition: `force` doesn't
+  // throw.
   void set_hand(HandForce force) { hand_force_ = std::move(force); }
 
-  // Truth, for summaries and studies; the controller never sees it.
+  // True values for summaries and studies; the controller never sees them.
   [[nodiscard]] const ToolState& tool() const noexcept { return arm_.tool(); }
   [[nodiscard]] models::Vec3 handle_force_W() const noexcept { return arm_.handle_force_W(); }
   [[nodiscard]] models::Vec3 handle_torque_W() const noexcept { return arm_.handle_torque_W(); }
 
  private:
-  // What is left to be done by a brake.
   struct Brake {
-    std::int64_t delay_ns = 0;      // of closing
-    std::int64_t unpowered_ns = 0;  // since its servo had power
-    std::int64_t closes_in_ns = 0;  // above 0: while its servo still holds the axis
+    std::int64_t delay_ns = 0;      // closing delay
+    std::int64_t unpowered_ns = 0;  // time since its servo lost power
+    std::int64_t closes_in_ns = 0;  // > 0: remaining time in which the servo still holds the axis
   };
 
   void step() noexcept;
@@ -108,13 +107,13 @@ class Plant {
   Hand hand_;
   ForceSensorModel force_sensor_;
   std::vector<ServoLoop> servos_;
-  std::vector<std::optional<GearTorqueSensor>> gear_torques_;  // of each axis
+  std::vector<std::optional<GearTorqueSensor>> gear_torques_;
   std::vector<std::int64_t> servo_period_ns_;
   std::vector<Brake> brakes_;
   std::optional<Clamp> clamp_;
-  HandForce hand_force_;  // empty: as the hand's description says
+  HandForce hand_force_;  // empty: force by the hand's description
   std::vector<double> torque_Nm_;
-  std::vector<models::Wrench> sensed_;  // on their way through the sensor, a step each; the next one is the oldest
+  std::vector<models::Wrench> sensed_;  // wrenches delayed by the sensor, one per step; the next one is the oldest
   std::size_t next_sensed_ = 0;
   std::int64_t start_ns_, time_ns_;
   std::int64_t hand_start_ns_ = 0;

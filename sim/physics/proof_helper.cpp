@@ -30,7 +30,7 @@ bool ProofHelper::enabled() const noexcept {
   return true;
 }
 
-// By what the drives are told: an arm that is leant on yields, and stands nevertheless.
+// Compares the drives' setpoints: a standing arm yields to a push.
 bool ProofHelper::was_moved() noexcept {
   bool moved = false;
   for (std::size_t axis = 0; axis < demand_counts_.size(); ++axis) {

@@ -1,14 +1,15 @@
-// The control loop inside a simulated servo drive: encoder in, motor torque out, setpoints interpolated between SYNCs.
+// The control loop inside a simulated servo drive: computes the motor torque from encoder and setpoint, and
+// interpolates setpoints between SYNCs.
 //
 // Cascade, once per servo period h; e = r − θ, with r the interpolated setpoint and θ the encoder's angle:
 //   v* = K_p e + f_v ṙ
 //   τ  = clamp( K_v (v* − θ̇) + K_i ∫(v* − θ̇) dt + f_a J_r r̈,  ± τ_max ),   K_v = J_r ω_v,  K_i = K_v ω_v/10
 // θ̇ is the difference of encoder counts over one servo period. All at the joint (gear ratio taken off), except counts.
 //
-// Setpoints: a target given at SYNC is reached one interpolation period later, along a straight line from where the
-// setpoint is; for the feed-forward ṙ ramps from the last segment's speed to this one's, so that a change of speed is
-// one period of constant torque rather than a kick. When no target comes, the last speed is kept for a quarter of a
-// period (SYNC may be held back by a frame), then the setpoint decelerates at the drive's limit to rest and stays.
+// Setpoints: a target given at SYNC is reached one interpolation period later, along a straight line from the present
+// setpoint. For the feed-forward, ṙ ramps from the last segment's speed to this one's: a change of speed is one period
+// of constant torque instead of an impulse. Without a new target, the last speed is kept for a quarter of a period (a
+// frame may hold back SYNC), then the setpoint decelerates to rest at the drive's limit.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +18,14 @@
 
 namespace proxarm::sim {
 
-// One drive's loop. Times are those of the network's clock, in nanoseconds; nothing here allocates or throws.
+// Times are in ns of the network's clock; nothing here allocates or throws.
 class ServoLoop {
  public:
   ServoLoop(const description::DriveDescription& drive, std::int64_t servo_period_ns) noexcept;
 
-  // Power and brake. enable() holds the present position, with the torque that the drive held when it was last enabled
-  // (at first: holding_torque_Nm, what gravity needs) so that a load doesn't drop when the brake opens.
-  void reset(double motor_angle_rad, double holding_torque_Nm) noexcept;  // not powered
+  // Power. enable() holds the present position, with the torque that the drive held when it was last enabled (at first:
+  // holding_torque_Nm, which carries gravity), so that a load doesn't drop when the brake opens.
+  void reset(double motor_angle_rad, double holding_torque_Nm) noexcept;  // without power
   void enable(std::int64_t time_ns) noexcept;
   void disable() noexcept;
   [[nodiscard]] bool powered() const noexcept { return powered_; }
@@ -32,30 +33,30 @@ class ServoLoop {
   // 60C2h. Takes effect with the next target.
   void set_interpolation_period_ns(std::int64_t period_ns) noexcept { period_ns_ = period_ns; }
 
-  // The motor gives no more than this, as a torque at the joint.
+  // Limits the motor's torque, given at the joint.
   void set_max_torque_Nm(double torque_Nm) noexcept { max_torque_Nm_ = torque_Nm; }
 
-  // At SYNC, with the latched 607Ah. Ignored when not powered. A setpoint faster than the drive's top speed lags behind
-  // its target (limited() says so).
+  // Call at SYNC with the latched 607Ah. Ignored without power. A setpoint faster than the drive's top speed lags
+  // behind its target (see limited()).
   void set_target(std::int32_t target_counts, std::int64_t time_ns) noexcept;
-  // From now on: to rest with this deceleration (rad/s²), then hold; until the next set_target(). For a SYNC without a
-  // new target, quick stop and halt.
+  // Decelerates to rest (rad/s²) and holds, until the next set_target(). For a SYNC without a new target, quick stop
+  // and halt.
   void stop(double deceleration_rad_per_s2, std::int64_t time_ns) noexcept;
   // Cyclic synchronous torque: 6071h as torque at the joint, without position control, until set_target() or stop().
   void set_torque_Nm(double torque_Nm) noexcept;
 
-  // One servo period: samples the encoder and returns the motor's torque at the joint, Nm, until the next call. Zero
-  // when not powered. Call at time_ns = k · servo period.
+  // One servo period: samples the encoder and returns the motor torque at the joint, Nm, for this period; 0 without
+  // power. Precondition: time_ns = k · servo period.
   double update(double motor_angle_rad, std::int64_t time_ns) noexcept;
 
-  // 6064h, 6062h, 60F4h, and more, as of the last update().
+  // 6064h, 6062h, 60F4h and others, at the last update().
   [[nodiscard]] std::int32_t position_counts() const noexcept { return counts_; }
   [[nodiscard]] std::int32_t demand_counts() const noexcept { return to_counts(setpoint_.position_rad); }
   [[nodiscard]] double following_error_rad() const noexcept { return setpoint_.position_rad - angle_rad_; }
   [[nodiscard]] double speed_rad_per_s() const noexcept { return speed_; }
   [[nodiscard]] double torque_Nm() const noexcept { return torque_Nm_; }
   [[nodiscard]] bool limited() const noexcept { return limited_; }               // torque or speed at its limit
-  [[nodiscard]] bool at_rest() const noexcept { return phase_ == Phase::hold; }  // the setpoint
+  [[nodiscard]] bool at_rest() const noexcept { return phase_ == Phase::hold; }  // of the setpoint
 
  private:
   enum class Phase : std::uint8_t { hold, segment, stopping, torque };
@@ -77,7 +78,7 @@ class ServoLoop {
   double velocity_feedforward_, acceleration_feedforward_, servo_period_s_;
   std::int64_t period_ns_ = 1'000'000;
 
-  // Setpoint; segment_* also describe a stop: from where, with which speed, since when
+  // Setpoint. segment_* also describe a stop: its start position, speed and time.
   Phase phase_ = Phase::hold;
   std::int64_t segment_start_ns_ = 0, segment_end_ns_ = 0;
   double segment_from_rad_ = 0.0, segment_speed_ = 0.0, previous_speed_ = 0.0;

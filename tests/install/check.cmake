@@ -36,7 +36,7 @@ foreach(file IN LISTS rest ITEMS share/man/man1/proxarm.1.gz share/man/man1/prox
   endif()
 endforeach()
 
-# What the view serves and what cells, scenes and hands are read from: every file is there, whatever its name ends in.
+# Files of the view's page, cells, scenes and hands: each must be installed, whatever its extension.
 file(GLOB_RECURSE shipped RELATIVE ${source} ${source}/controller/view/page/* ${source}/models/cells/*.yaml
      ${source}/scenes/*.yaml ${source}/scenes/meshes/* ${source}/sim/hands/*.yaml)
 list(FILTER shipped INCLUDE REGEX "\\.[a-z]+$")
@@ -52,7 +52,7 @@ run(${CMAKE_COMMAND} --build ${folder}/own_world)
 run(${folder}/own_world/own_world)
 message(STATUS "${output}")
 
-# The examples of docs/library.md, as they are installed, with the data that is installed.
+# The installed examples of docs/library.md, with the installed data.
 run(${CMAKE_COMMAND} -G Ninja -S ${folder}/prefix/share/doc/proxarm/docs/examples -B ${folder}/examples
     -D CMAKE_PREFIX_PATH=${folder}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_BUILD_TYPE=Debug)
 run(${CMAKE_COMMAND} --build ${folder}/examples)

@@ -1,4 +1,4 @@
-// The arm that commissioning leads: a simulated one in this process and in virtual time, or one on interfaces.
+// The arm that commissioning moves: a simulated one in this process and in virtual time, or one on interfaces.
 #pragma once
 
 #include <string>
@@ -13,16 +13,16 @@
 
 namespace proxarm::command_line {
 
-// A hand that isn't there.
+// A simulated hand without mass, stiffness and damping.
 description::HandDescription nobody();
 
-// `arm` outlives it.
+// Precondition: `arm` outlives this object.
 struct SimulatedArm {
   SimulatedArm(const PreparedSession& arm, const RunOptions& options,
                const description::HandDescription& hand = nobody());
 
   void power_on();
-  // The parts of a cycle that leads it, its devices brought up. `scene` outlives them.
+  // Brings the devices up and returns the parts of a cycle for this arm. Precondition: `scene` outlives the parts.
   controller::CycleParts brought_up(const PreparedSession& session, scenes::CompiledScene& scene);
 
   fieldbus::SimulatedCanNetwork network;
@@ -30,7 +30,7 @@ struct SimulatedArm {
 };
 
 struct ArmOnInterfaces {
-  // Opened, after consent where the arm is a real one. Throws SetupError as `run` does.
+  // Opens the interfaces, for a real arm after consent. Throws SetupError as `run` does.
   ArmOnInterfaces(const PreparedSession& session, const RunOptions& options);
 
   // As above.

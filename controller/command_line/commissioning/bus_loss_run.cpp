@@ -22,7 +22,7 @@ namespace {
 using description::Json;
 using proof::OwnStop;
 
-// A drive counts the time by its own clock, and tells it by a frame.
+// A drive measures the time by its own clock, and its stop is seen only in its next frame.
 constexpr double drives_own_clock_s = 0.005;
 
 struct Outcome {
@@ -99,7 +99,7 @@ Outcome on_interfaces(const PreparedSession& session, const RunOptions& options)
   return outcome;
 }
 
-// Empty: it stops by itself in time.
+// Empty: the drive stopped by itself in time.
 std::string failure_of(const OwnStop& stop, double promised_s) {
   if (!stop.off_at_last) return "is still enabled";
   if (stop.reacts_s < 0.0) return "is off at last, but nothing on the bus said when";
@@ -136,7 +136,7 @@ Json json_of(const std::vector<OwnStop>& stops, double promised_s, bool proven, 
   return json;
 }
 
-// Returns whether the proof of all else is kept there, too.
+// Returns whether the file also holds the rest of the proof.
 bool keep(const PreparedSession& session, const Outcome& outcome, const std::filesystem::path& file) {
   const std::string hash = cell_sha256(session);
   ProofFile proof{hash, outcome.real_arm, today(), "drives stop without the controller", false, {}};

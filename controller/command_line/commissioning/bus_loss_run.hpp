@@ -1,4 +1,4 @@
-// `proxarm prove --bus-loss`: the controller falls silent on purpose, against a simulated arm or on interfaces.
+// `proxarm prove --bus-loss`: silences the controller on purpose, against a simulated arm or on interfaces.
 #pragma once
 
 #include <filesystem>
@@ -7,9 +7,8 @@
 
 namespace proxarm::command_line {
 
-// Prints how each drive on CAN stopped and when, and keeps that in `file`, the cell's proof, beside what is there. Exit
-// status: 1 where a drive doesn't stop within what the cell says (supervision.bus_loss_stop_s). `arm`: of a simulated
-// one.
+// Prints how and when each drive on CAN stopped, and adds that to `file`, the cell's proof. Exit status 1: a drive
+// didn't stop within supervision.bus_loss_stop_s. `arm` is the session of the simulated arm.
 int prove_bus_loss(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
                    const std::filesystem::path& file);
 

@@ -27,7 +27,7 @@ using Slots = std::vector<fieldbus::DriveSlot>;
 
 constexpr std::int64_t listen_ns = 100'000'000, boot_ns = 200'000'000;
 
-// The cell's drives, to be asked; none is configured.
+// The cell's drives, for requests only: none is configured.
 class Drives {
  public:
   Drives(const description::Cell& cell, const controller::BusIndices& indices) {
@@ -61,7 +61,7 @@ void listen(fieldbus::CanNetwork& network, std::int64_t time_ns, const fieldbus:
   });
 }
 
-// What the drives answer, and the enabling input's messages where it is one on a bus.
+// Accepts the drives' answers, and the messages of an enabling input on a bus.
 void pass_answers(fieldbus::SocketCanNetwork& network, const Slots& slots,
                   const std::optional<controller::EnablingInput>& enabling) {
   for (std::size_t bus = 0; bus < network.bus_count(); ++bus) {
@@ -81,7 +81,7 @@ std::vector<std::int32_t> read_counts(fieldbus::CanNetwork& network, const Slots
   return counts;
 }
 
-// Marks are on the links, encoders on the motors, which gravity's twist of the gears puts ahead of them.
+// Marks are on the links, encoders on the motors. Gravity twists the gears, so the motor angles differ from the marks.
 std::vector<double> motor_angles(const description::Cell& cell, const std::vector<double>& link_rad) {
   const models::Arm arm(cell);
   const models::JointVector link = Eigen::Map<const Eigen::VectorXd>(link_rad.data(), arm.axes());
@@ -89,7 +89,6 @@ std::vector<double> motor_angles(const description::Cell& cell, const std::vecto
   return {motor.data(), motor.data() + motor.size()};
 }
 
-// The arm of this process stands where it is asked to.
 MarkedPose pose_of_simulated(const PreparedSession& session, const PreparedSession& arm,
                              const std::vector<double>& angle_rad) {
   description::Cell cell = arm.cell;
@@ -117,7 +116,7 @@ void ask_for_pose(const description::Cell& cell, const std::vector<double>& angl
   }
 }
 
-// The switch of the person beside the arm, where the cell has one that is a message on a bus.
+// The enabling switch of the person beside the arm, if it is a message on a bus.
 std::optional<controller::EnablingInput> enabling_message(const PreparedSession& session,
                                                           const controller::BusIndices& indices) {
   const auto& input = session.cell.enabling_input;
@@ -136,7 +135,7 @@ class Interfaces {
     require_nodes_apart(session, names_);
     listen(session);
   }
-  // Before drives are asked, each time that somebody was waited for: another session may have begun.
+  // Called after each wait for the person, before drives are asked: another session may have begun meanwhile.
   void listen(const PreparedSession& session) {
     listen_before_speaking(network_, drives_.slots());
     pass_answers(network_, drives_.slots(), enabling_message(session, indices_in(network_, names_.size())));
@@ -173,7 +172,7 @@ std::vector<MarkedPose> marked_poses(const PreparedSession& session, const Prepa
   return poses;
 }
 
-// Whether all poses after the first agree with it; says which joint doesn't.
+// Returns whether all poses after the first agree with it; prints each joint that doesn't.
 bool poses_agree(const description::Cell& cell, const std::vector<MarkedPose>& poses,
                  const std::vector<std::int32_t>& offsets, double tolerance_rad) {
   bool agree = true;
@@ -239,7 +238,7 @@ class Permission {
   std::atomic<bool> stopped_{false};
 };
 
-// One joint after the other: a mistake moves one.
+// One joint after the other, so that a mistake moves only one.
 void home_all(fieldbus::CanNetwork& network, const Slots& slots, Permission& permission) {
   const fieldbus::FrameHandler on_frame = [&](std::size_t bus, const fieldbus::TimedFrame& received) {
     permission.on_frame(bus, received);

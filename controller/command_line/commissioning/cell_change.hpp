@@ -1,4 +1,4 @@
-// A cell's file with some values changed in its text, by a command that has found them: comments and all else stay.
+// Changes values in the text of a cell's file; comments and everything else stay.
 #pragma once
 
 #include <filesystem>
@@ -9,12 +9,11 @@
 
 namespace proxarm::command_line {
 
-// Whether a place of a YAML text is behind a # of its line.
+// Returns whether this place of a YAML text is behind a # in its line.
 bool in_comment(const std::string& text, std::size_t at);
 
-// Writes `edit` of the cell's text to its file. What was there goes to a backup beside it, FILE.before-WHAT, whose path
-// is returned. The new text is loaded first: where it is no cell, or `check` throws, nothing is changed. Throws
-// SetupError.
+// Replaces the cell's text by `edit` of it. Returns the path of a backup beside the file, FILE.before-WHAT. The new
+// text is loaded first: if it isn't a valid cell or `check` throws, the file is unchanged. Throws SetupError.
 std::filesystem::path change_cell(const std::filesystem::path& file, const std::string& what,
                                   const std::function<std::string(const std::string& text)>& edit,
                                   const std::function<void(const description::Cell& written)>& check);

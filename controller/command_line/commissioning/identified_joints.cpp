@@ -34,7 +34,7 @@ std::string formatted(const char* format, double value) {
   return word.data();
 }
 
-// As many digits as the uncertainty leaves a meaning to: its second one is the last.
+// Rounds to the second digit of the uncertainty, as further digits have no meaning.
 std::string value_text(double value, double half) {
   const int decimals = half > 0.0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(half))), 0, 7) : 6;
   std::array<char, 40> word{};
@@ -60,8 +60,7 @@ std::string line(const JointFigure& figure, bool compare) {
   return told + "\n";
 }
 
-// Where a drive's entry begins and ends in the cell's text: at its `joint:` and at the next one's, or where the
-// section ends.
+// The range of a drive's entry in the cell's text: from its `joint:` to the next one, or to the end of the section.
 std::pair<std::size_t, std::size_t> entry_of(const std::string& text, const std::string& joint) {
   std::string pattern = R"(\bjoint:\s*["']?)";
   for (const char c : joint)
@@ -76,7 +75,7 @@ std::pair<std::size_t, std::size_t> entry_of(const std::string& text, const std:
   return {from, ends ? from + 6 + static_cast<std::size_t>(end.position(0)) : text.size()};
 }
 
-// Replaces the number behind each such key of the entry; returns how many there were.
+// Replaces the number behind each occurrence of the key in the entry; returns their count.
 int replace_all(std::string& text, const std::string& joint, const std::string& key, const std::string& fresh) {
   const std::regex pattern("\\b" + key + R"(:\s*([-+.0-9eE]+))");
   int replaced = 0;
@@ -109,8 +108,8 @@ std::string bare(const std::string& key) {
                     .expected = fresh});
 }
 
-// Puts a key that the entry of a joint's drive doesn't have into it, or into its `simulation`, which an entry that has
-// all of it from simulation_defaults gets now. Returns false where that can't be done.
+// Adds a missing key to the entry of a joint's drive, or to the entry's `simulation`. If the entry has no `simulation`
+// because it takes all from simulation_defaults, adds that, too. Returns false if the key can't be added.
 bool insert(std::string& text, const std::string& joint, const std::string& key, const std::string& fresh) {
   const std::vector<description::YamlStep> entry{{"drives"}, {"joint", joint}};
   const std::size_t dot = key.find('.');
@@ -135,12 +134,12 @@ std::string with_joints(const std::string& text, const std::vector<JointFigure>&
     if (!figure.estimate.found) continue;
     const std::string fresh = formatted("%.6g", figure.estimate.value);
     const int replaced = replace_all(changed, figure.joint, bare(figure.key), fresh);
-    // A damping that stands only where the simulated drive has it isn't the controller's.
+    // The damping must also be in the drive itself: the controller doesn't read `simulation`.
     const bool inserted =
         (replaced == 0 || figure.key == damping_key) && insert(changed, figure.joint, figure.key, fresh);
     if (replaced == 0 && !inserted) refuse(cell, figure, fresh);
     if (figure.key == damping_key) own_simulation(changed, figure.joint, damping_key, fresh);
-    // The stiffness that was found is the real one, which a simulation needn't multiply any more.
+    // The stiffness found is the real one, so the simulation must not scale it any more.
     if (figure.key == stiffness_key && replace_all(changed, figure.joint, "gear_stiffness_ratio", "1") == 0) {
       own_simulation(changed, figure.joint, "gear_stiffness_ratio", "1");
     }

@@ -1,4 +1,4 @@
-// What `proxarm identify` has found: told in words and as JSON, compared with the cell, and written into it.
+// The result of `proxarm identify`: prints it as text and JSON, compares it with the cell, and writes it there.
 #pragma once
 
 #include <array>
@@ -14,28 +14,28 @@
 
 namespace proxarm::command_line {
 
-// A value of the cell, or of its CELL.zero, beside the one that was found.
+// A value in the cell or its CELL.zero, and the identified value.
 struct ToolDifference {
   std::string key;
-  std::vector<double> in_cell, found, half;  // of the 95 % interval
+  std::vector<double> in_cell, found, half;  // half: half the width of the 95 % interval
 
-  [[nodiscard]] bool differs() const noexcept;  // by more than the interval, somewhere
+  [[nodiscard]] bool differs() const noexcept;  // by more than the interval in any component
 };
 
 struct IdentifiedTool {
   identification::ToolFit fit;
   identification::Allowances allowances;
-  std::string failure;    // what ended the session, or why the result isn't to be believed; empty: nothing
-  std::string not_shown;  // what isn't identifiable, and why
+  std::string failure;    // why the session ended early, or why the result isn't credible; empty: no failure
+  std::string not_shown;  // which values can't be identified, and why
   std::vector<proof::Reading> readings;
   bool real_arm = false;
 
   [[nodiscard]] bool found() const noexcept { return failure.empty() && fit.mass_found; }
-  // All that belongs into the cell and its zero.
+  // Whether all values for the cell and its zero were found.
   [[nodiscard]] bool whole() const noexcept { return found() && fit.centre_found; }
 };
 
-// `zero`: the one that is kept beside the cell, if any.
+// `zero`: the zero kept beside the cell, if any.
 std::vector<ToolDifference> compare(const IdentifiedTool& tool, const description::Cell& cell,
                                     const std::optional<ZeroFile>& zero);
 
@@ -44,12 +44,12 @@ std::string text(const std::vector<ToolDifference>& differences);
 description::Json json(const IdentifiedTool& tool);
 description::Json json(const std::vector<ToolDifference>& differences);
 
-// The cell's text with this tool.mass_kg and tool.centre_of_mass_S_m; everything else stays as it is. Throws SetupError
-// where one of them isn't found.
+// Returns the cell's text with this tool.mass_kg and tool.centre_of_mass_S_m; everything else stays. Throws SetupError
+// if a key isn't found.
 std::string with_tool(const std::string& text, const description::Cell& cell, double mass_kg,
                       const std::array<double, 3>& centre_S_m);
 
-// Writes both to the cell's file, and the zero of that cell to CELL.zero. Returns the path of the cell's backup.
+// Writes both values to the cell's file, and the new cell's zero to CELL.zero. Returns the path of the cell's backup.
 // Precondition: whole(). Throws SetupError.
 std::filesystem::path write_tool(const IdentifiedTool& tool, const PreparedSession& session);
 

@@ -12,7 +12,7 @@ namespace {
 
 using description::SetupError;
 
-// Where `joint: NAME` ends in the text, a comment apart; npos: nowhere.
+// Returns where `joint: NAME` ends in the text, comments excluded; npos if it isn't there.
 std::size_t end_of_joint(const std::string& text, const std::string& joint, std::size_t from) {
   const std::regex key(R"((^|[\s{,-])joint:\s*["']?)" + joint + R"(["']?(?=[\s,}#]|$))");
   std::smatch match;
@@ -27,7 +27,7 @@ std::size_t end_of_joint(const std::string& text, const std::string& joint, std:
   return std::string::npos;
 }
 
-// The next drive's, or the end.
+// Returns where the next drive begins, or the end of the section.
 std::size_t end_of_drive(const std::string& text, std::size_t from) {
   static const std::regex next(R"((^|\n)\s*-\s*\{?\s*joint:|\n[A-Za-z_])");
   std::smatch match;

@@ -1,5 +1,5 @@
-// The zeros of a cell's encoders: from positions that drives report in poses whose angles are known, into the cell's
-// file.
+// Finds the zeros of a cell's encoders from the positions that drives report in poses with known angles, and writes
+// them into the cell's file.
 #pragma once
 
 #include <cstdint>
@@ -10,27 +10,27 @@
 
 namespace proxarm::command_line {
 
-// Where somebody has brought the arm to, as angles of the motors at the joints, and what each drive then reports
+// A pose to which a person has brought the arm: the motor angles at the joints, and each drive's reported position
 // (6064h).
 struct MarkedPose {
   std::vector<double> angle_rad;
   std::vector<std::int32_t> counts;
 };
 
-// offset_counts so that the first pose has its angles: counts − angle · counts per rad. Throws SetupError where that
-// doesn't fit 32 bits.
+// Returns the offset_counts with which the first pose has its angles: counts − angle · counts per rad. Throws
+// SetupError if that doesn't fit 32 bits.
 std::int32_t offset_by(const description::DriveDescription& drive, double angle_rad, std::int32_t counts);
 
-// How far the angle by `offset` is from the marks in this pose, rad.
+// Returns the angle computed with `offset` minus the mark in this pose, rad.
 double off_by(const description::DriveDescription& drive, std::int32_t offset, double angle_rad, std::int32_t counts);
 
-// The cell's text with drives[i].offset_counts = offsets[i]; everything else, comments too, stays as it is. Throws
-// SetupError where a drive isn't found in the text.
+// Returns the cell's text with drives[i].offset_counts = offsets[i]; everything else, comments too, stays. Throws
+// SetupError if the text lacks a drive.
 std::string with_offsets(const std::string& text, const description::Cell& cell,
                          const std::vector<std::int32_t>& offsets);
 
-// Writes that to the cell's file, and keeps what was there in a backup beside it, whose path is returned. The new text
-// must be the same cell but for the offsets; else nothing is changed. Throws SetupError.
+// Writes that text to the cell's file and returns the path of a backup beside it. If the new text differs from the cell
+// in more than the offsets, the file is unchanged. Throws SetupError.
 std::filesystem::path write_offsets(const description::Cell& cell, const std::vector<std::int32_t>& offsets);
 
 }  // namespace proxarm::command_line

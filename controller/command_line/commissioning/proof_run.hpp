@@ -1,4 +1,5 @@
-// `proxarm prove` and what moves as it does: the session, against a simulated arm in this process or on interfaces.
+// Runs `proxarm prove`, and commands that move the arm in the same way, against a simulated arm in this process or on
+// interfaces.
 #pragma once
 
 #include <filesystem>
@@ -18,31 +19,31 @@ struct ProofOutcome {
   bool real_arm = false;
 };
 
-// What ended the session before all was read, and brakes that don't hold; empty: nothing.
+// Says why the session ended early, or that the brakes don't hold; empty: no failure.
 std::string failure_of(const PreparedSession& session, const ProofOutcome& outcome);
 
-// `arm`: what the simulated arm is, where that isn't what the controller takes it for. A simulated hand pushes where it
-// is asked to; with options.hand that one is at the handle all along. In virtual time, nothing printed.
+// Runs in virtual time and prints nothing. `arm` is the simulated arm, which may differ from the controller's cell. A
+// simulated hand pushes when asked; a hand in options.hand replaces it.
 ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
                              const proof::Task& task = {});
 
-// On the interfaces of options.bus, in real time; tells on standard error what is to be done. Throws SetupError as
-// `run` does, but wants no proof.
+// Runs on the interfaces of options.bus in real time, and prints on standard error what the person is to do. Throws
+// SetupError as `run` does, but needs no proof.
 ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options,
                                  const proof::Task& task = {});
 
-// Makes a session of a command's options. Throws SetupError.
+// Throws SetupError.
 using PrepareSession = PreparedSession (*)(const RunOptions& options);
 
-// The session of a command that is about to move the arm, once what forbids that has been asked for: a real arm without
-// --hardware, what only a simulation has on interfaces, a missing enabling switch, a bus that can't carry it. `arm`:
-// the cell of the simulated arm; empty: the command's own. Throws SetupError.
+// Prepares a session that moves the arm. Refuses a real arm without --hardware, options of a simulation on interfaces,
+// a missing enabling switch, and a bus that can't carry the timestep. `arm`: the cell of the simulated arm; empty: the
+// command's own. Throws SetupError.
 PreparedSession session_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare);
 
-// The simulated arm's session: of the cell `arm`, or of the command's own where that is empty. Throws SetupError.
+// Prepares the simulated arm's session: from the cell `arm`, or from the command's own if empty. Throws SetupError.
 PreparedSession arm_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare);
 
-// prove_simulated() where the bus is simulated, else prove_on_interfaces().
+// Calls prove_simulated() if the bus is simulated, else prove_on_interfaces().
 ProofOutcome prove_arm(const PreparedSession& session, const RunOptions& options, const std::filesystem::path& arm,
                        PrepareSession prepare, const proof::Task& task = {});
 

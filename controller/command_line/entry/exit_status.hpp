@@ -1,5 +1,5 @@
-// How the program ends. A session in which the arm swung by itself for a second or more (report/oscillation.hpp) ends
-// as one that a fault ended.
+// The exit statuses. A session in which the arm oscillated by itself for a second or more (report/oscillation.hpp) ends
+// with the status of a fault.
 #pragma once
 
 namespace proxarm::command_line {

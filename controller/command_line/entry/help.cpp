@@ -7,8 +7,8 @@ namespace {
 
 constexpr std::size_t text_column = 30;
 
-// Words in lines of at most help_columns, each but the first begun by `margin` blanks, the first after `used` columns.
-// Lines of the text stay apart.
+// Wraps text to help_columns. The first line starts after `used` columns; later lines are indented by `margin`. Line
+// breaks in the text are kept.
 std::string wrapped(const std::string& text, std::size_t margin, std::size_t used) {
   std::string result;
   std::size_t column = used;

@@ -1,4 +1,4 @@
-// How help is laid out: names on the left, texts on the right, wrapped.
+// Lays out help: names on the left, wrapped texts on the right.
 #pragma once
 
 #include <CLI/CLI.hpp>

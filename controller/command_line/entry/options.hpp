@@ -1,4 +1,4 @@
-// What options take, checked while the command line is parsed, so that CLI11 names the option in its message.
+// Parsers of option values. They run while CLI11 parses the command line, so that its messages name the option.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -23,7 +23,6 @@ CLI::callback_t quantity(Parse parse, Store store) {
   };
 }
 
-// One word out of a few.
 template <typename Value, typename Store>
 CLI::callback_t choice(std::string option, std::map<std::string, Value> choices, Store store) {
   return [option = std::move(option), choices = std::move(choices), store](const CLI::results_t& words) {
@@ -39,11 +38,11 @@ CLI::callback_t choice(std::string option, std::map<std::string, Value> choices,
   };
 }
 
-// CLI11's message about options, in one line and with the nearest one that `command` knows.
+// Returns CLI11's message about options as one line, with the nearest option that `command` knows.
 std::string options_mistake(const CLI::App& command, const std::vector<std::string>& words,
                             const CLI::ParseError& error);
 
-// A whole number in decimal digits.
+// In decimal digits.
 CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_t)> store);
 
 }  // namespace proxarm::command_line

@@ -1,4 +1,4 @@
-// A program of ours around its commands.
+// The frame around each of the project's programs: runs a command and reports its errors.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,16 +9,17 @@
 
 namespace proxarm::command_line {
 
-// What `main` returns: opens the standard descriptors, runs, says in one line what went wrong, and hands over what was
-// printed.
+// Returns the exit status for `main`. Opens the standard descriptors, calls `run`, prints an error as one line, and
+// flushes standard output.
 int run_program(const std::function<int()>& run) noexcept;
 
-// Prints options_mistake(). `called` is how the command was called, such as "proxarm run". Returns the exit status.
+// Prints options_mistake() as one line. `called` is the command as the user typed it, such as "proxarm run". Returns
+// the exit status.
 int refuse_options(const CLI::App& command, const std::string& called, const std::vector<std::string>& words,
                    const CLI::ParseError& error);
 
-// The options of a program that is one command and bears its name, such as "proxarm study". The exit status where there
-// is nothing left to do: after --help, or options that are refused.
+// Parses the options of a single-command program such as "proxarm study". Returns the exit status if the program is
+// done: after --help, or if options were refused.
 std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv);
 
 }  // namespace proxarm::command_line

@@ -13,7 +13,7 @@
 namespace proxarm::command_line {
 
 void open_standard_descriptors() noexcept {
-  // open() takes the lowest number that is free, so that each lands where it is wanted.
+  // open() returns the lowest free number, which is the one wanted here.
   for (int descriptor = STDIN_FILENO; descriptor <= STDERR_FILENO; ++descriptor) {
     if (fcntl(descriptor, F_GETFD) != -1) continue;
     [[maybe_unused]] const int opened = open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
@@ -25,7 +25,7 @@ int flush_standard_output(int status) noexcept {
   std::cout.flush();
   const bool lost = std::fflush(stdout) != 0 || std::ferror(stdout) != 0 || !std::cout;
   if (!lost) return status;
-  if (errno == 0) {  // it was lost earlier; another character fails for the same reason
+  if (errno == 0) {  // the error happened earlier; another character fails for the same reason
     std::fputc('\n', stdout);
     std::fflush(stdout);
   }

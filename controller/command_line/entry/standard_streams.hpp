@@ -1,14 +1,14 @@
-// Standard input, output and error as the program was given them.
+// Keeps the standard streams safe to use, however the program was started.
 #pragma once
 
 namespace proxarm::command_line {
 
-// First of all: a descriptor among 0, 1 and 2 that is closed is opened so that reading or writing fails as it would
-// have. Else the next file, a record or a bus, would get its number and what is printed.
+// Call this first. Opens each closed descriptor among 0, 1 and 2 so that reading or writing still fails. Otherwise the
+// next file opened, such as a record or a bus, would get that number and receive printed text.
 void open_standard_descriptors() noexcept;
 
-// Last of all: what was printed is handed over. Where that fails (a full disk, a closed pipe) it is said on standard
-// error, and a status of `fine` becomes `set_up_mistake`.
+// Call this last. Flushes standard output. If that fails (full disk, closed pipe), prints so on standard error and
+// turns a status of `fine` into `set_up_mistake`.
 int flush_standard_output(int status) noexcept;
 
 }  // namespace proxarm::command_line

@@ -7,15 +7,15 @@ namespace proxarm::command_line {
 
 class BrowserDoor {
  public:
-  // Where there is a desktop and somebody at a terminal: opens it. Nowhere else, and never throws: the address is
-  // printed anyway.
+  // Opens the address if there is a desktop and a terminal; otherwise does nothing. Never throws, because the address
+  // is printed anyway.
   explicit BrowserDoor(const std::string& url);
   BrowserDoor(const BrowserDoor&) = delete;
   BrowserDoor& operator=(const BrowserDoor&) = delete;
   ~BrowserDoor();
 
  private:
-  std::string file_;  // leads to the address, and only its owner may read it: a command line everybody may
+  std::string file_;  // leads to the address, readable by its owner only: a command line would show it to everybody
 };
 
 }  // namespace proxarm::command_line

@@ -18,7 +18,7 @@
 #include <istream>
 #include <optional>
 #include <thread>
-#include <utility>  // before Asio 1.74, which forgets it
+#include <utility>  // before Asio 1.74, which doesn't include it
 
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
@@ -41,12 +41,11 @@ using boost::system::error_code;
 using description::SetupError;
 
 constexpr std::size_t longest_line = 1024;
-constexpr std::size_t most_connections = 16;        // a person has one or two
-constexpr auto patience = std::chrono::seconds(2);  // with somebody who connects and says nothing
-constexpr auto retry_after =
-    std::chrono::milliseconds(10);  // what keeps accept from succeeding lasts longer than a call
-constexpr auto time_for_a_line = std::chrono::milliseconds(50);  // from connecting, where descriptors are scarce
-// A live session answers orders and a status in some milliseconds. Changes are judged first, which may take longer.
+constexpr std::size_t most_connections = 16;                     // a person has one or two
+constexpr auto patience = std::chrono::seconds(2);               // with a client that connects and sends nothing
+constexpr auto retry_after = std::chrono::milliseconds(10);      // an obstacle to accept() lasts longer than a call
+constexpr auto time_for_a_line = std::chrono::milliseconds(50);  // from connecting, if descriptors are scarce
+// A live session answers orders and a status in some milliseconds. Changes are checked first, which may take longer.
 constexpr int answer_within_ms = 5000, status_within_ms = 1000;
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& found, const std::string& expected) {
@@ -63,7 +62,7 @@ void require_own_folder(const fs::path& folder) {
   if ((status.st_mode & 077) != 0) refuse(folder, "a folder that others may enter", "mode 0700");
 }
 
-// Of a session that has died; one that lives answers.
+// Removes the socket of a session that has died; a live session would answer.
 void remove_stale(const fs::path& path) {
   struct stat status {};
   if (lstat(path.c_str(), &status) != 0) return;
@@ -105,7 +104,7 @@ struct Connection {
 };
 using Client = std::shared_ptr<Connection>;
 
-// Anything that is thrown is an answer: an exception out of the thread would end the session in motion.
+// An exception becomes an answer: if it left the thread, it would end the session in motion.
 template <typename Handle>
 std::string answer_of(const Handle& handle) {
   try {
@@ -115,7 +114,7 @@ std::string answer_of(const Handle& handle) {
   }
 }
 
-// File descriptors that are kept for when there are no others.
+// Reserved file descriptors, released when the process has no others.
 class Reserve {
  public:
   Reserve() {
@@ -126,13 +125,13 @@ class Reserve {
   Reserve& operator=(const Reserve&) = delete;
   ~Reserve() { give(); }
 
-  // Of those that were given away, as many as there are again.
+  // Reserves again as many of the released descriptors as possible.
   void keep() noexcept {
     for (int& kept : kept_) {
       if (kept < 0) kept = open("/dev/null", O_RDONLY | O_CLOEXEC);
     }
   }
-  // False: there is none.
+  // Releases all; returns false if none was reserved.
   bool give() noexcept {
     bool given = false;
     for (int& kept : kept_) {
@@ -147,7 +146,7 @@ class Reserve {
   std::array<int, 4> kept_{};
 };
 
-// Held by the session that listens at `path`. The file stays: removing it would let two hold it.
+// Held by the session that listens at `path`. The lock file stays: if it were removed, two sessions could hold it.
 class PathLock {
  public:
   explicit PathLock(const fs::path& path)
@@ -165,8 +164,8 @@ class PathLock {
   int descriptor_;
 };
 
-// The path, free for a socket and for nobody else. What is done about a socket that is there already is done under the
-// lock: else it could be that of a session which begins.
+// Locks the path for this process. A stale socket is removed under the lock, because without it the socket could belong
+// to a session that is just starting.
 std::unique_ptr<PathLock> claim(const fs::path& path) {
   (void)endpoint_of(path);
   require_own_folder(path.parent_path());
@@ -177,7 +176,7 @@ std::unique_ptr<PathLock> claim(const fs::path& path) {
 
 }  // namespace
 
-// Everything but `judge` runs in the thread of `context`.
+// Everything except `judge` runs in the thread of `context`.
 struct ControlSocket::State {
   State(const fs::path& at, ControlHandlers h) : path(at), handlers(std::move(h)), lock(claim(at)) {}
 
@@ -208,8 +207,8 @@ struct ControlSocket::State {
       accept();
     });
   }
-  // Mostly for want of a file descriptor, which accept takes before it looks whether anybody is there: the clients that
-  // are being served are no reason to end one, unless it had time to say what it wants.
+  // accept() usually fails because it takes a file descriptor before it checks whether a client waits. So a client
+  // being served is ended only if it had time to send its line.
   void accept_later() {
     const auto latest = std::chrono::steady_clock::now() - time_for_a_line;
     if (!reserve.give() && !clients.empty() && clients.front()->since < latest) end(clients.front());
@@ -243,7 +242,7 @@ struct ControlSocket::State {
     boost::asio::post(judging, [this, client, text] { judge(client, text); });
   }
   void judge(const Client& client, const std::string& text) {
-    if (client->closed.load()) return;  // nobody would hear what has become of it
+    if (client->closed.load()) return;  // the client couldn't learn the result
     std::string answer = answer_of([&] { return handlers.change(text); });
     boost::asio::post(context, [this, client, answer = std::move(answer)] { reply(client, answer); });
   }
@@ -252,7 +251,7 @@ struct ControlSocket::State {
     boost::asio::async_write(client->socket, boost::asio::buffer(client->answer),
                              [this, client](const error_code&, std::size_t) { end(client); });
   }
-  void end(Client client) {  // by value: it may be the list's own
+  void end(Client client) {  // by value: the argument may be the list's element
     error_code ignored;
     client->closed.store(true);
     client->timer.cancel();
@@ -269,7 +268,7 @@ ControlSocket::ControlSocket(const fs::path& path, ControlHandlers handlers)
   state_->acceptor.open(endpoint.protocol(), error);
   if (!error) state_->acceptor.bind(endpoint, error);
   if (error) refuse(path, error.message(), "a path where a socket can be made");
-  chmod(state_->path.c_str(), 0600);  // nobody else could come here before: the folder is ours alone
+  chmod(state_->path.c_str(), 0600);  // nobody else could come here before: only this user may enter the folder
   state_->acceptor.listen();
   state_->accept();
   state_->judging_thread = std::thread([this] { state_->judging.run(); });

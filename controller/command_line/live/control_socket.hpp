@@ -1,12 +1,13 @@
-// A session's ear: a Unix socket that takes a line and answers with one, for its owner alone. A line is an order, such
-// as "hold", or changes "NAME=VALUE", several of them with a tab between two.
+// A Unix socket through which a running session takes orders and changes from its owner. A client sends one line, of at
+// most 1024 bytes, and gets one line back. A line is an order, such as "hold", or changes "NAME=VALUE", separated by
+// tabs.
 //
-// The socket has mode 0600 in a folder of mode 0700, and who connects is asked of the kernel (SO_PEERCRED): another
-// user is turned away even where a file system knows no modes. It is no network port. Lines are at most 1024 bytes.
+// The socket has mode 0600 in a folder of mode 0700. The kernel reports the client's user (SO_PEERCRED), so other users
+// are refused even on a file system without modes.
 //
-// An order is answered whatever other clients do. Sixteen connections are served at once; one more takes the place of
-// the oldest, and each has two seconds. What takes longer to judge than an order waits in a thread of its own. Where
-// the process has no file descriptors left for connections, four that were kept for that are used.
+// Orders are answered whatever other clients do; changes take longer to judge and have their own thread. Sixteen
+// connections are served at once, each for two seconds; one more replaces the oldest. If the process has no file
+// descriptors left, four reserved ones are used.
 #pragma once
 
 #include <filesystem>
@@ -18,37 +19,37 @@
 
 namespace proxarm::command_line {
 
-// What gives the answers. Each may throw; the text is the answer then.
+// Give the answers. If a handler throws, the exception's text is the answer.
 struct ControlHandlers {
-  // An order, in the socket's own thread and at once; nothing: the line is none.
+  // An order, answered at once in the socket's thread; nullopt: the line isn't an order.
   std::function<std::optional<std::string>(const std::string& line)> order;
-  // All else, one line after the other, in a second thread.
+  // All other lines, one after the other, in a second thread.
   std::function<std::string(const std::string& line)> change;
 };
 
 class ControlSocket {
  public:
-  // Makes the folder where it isn't there. Throws SetupError: a folder that others may enter, a path that is taken.
+  // Makes the folder if necessary. Throws SetupError if others may enter the folder or the path is taken.
   ControlSocket(const std::filesystem::path& path, ControlHandlers handlers);
   ControlSocket(const ControlSocket&) = delete;
   ControlSocket& operator=(const ControlSocket&) = delete;
-  ~ControlSocket();  // and the socket's file is gone
+  ~ControlSocket();  // removes the socket's file
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
 
-// Before a bus is opened: throws SetupError where ControlSocket would.
+// Throws SetupError where ControlSocket would. Call it before a bus is opened.
 void require_control_path(const std::filesystem::path& path);
 
-// What an answer begins with where the session does as it is asked.
+// Answers begin with this if the session complies.
 inline constexpr std::string_view agreed = "ok: ";
 
-// Sends a line and returns the answer. Throws SetupError where nobody listens.
+// Sends a line and returns the answer. Throws SetupError if no session listens.
 std::string ask_control_socket(const std::filesystem::path& path, const std::string& line);
 
-// Where `proxarm set` looks when it isn't told: proxarm/control in the user's runtime folder, or in /tmp/proxarm-UID.
+// Default path of `proxarm set`: proxarm/control in the user's runtime folder, or in /tmp/proxarm-UID.
 std::filesystem::path default_control_path();
 
 }  // namespace proxarm::command_line

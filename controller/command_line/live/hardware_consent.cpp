@@ -142,7 +142,6 @@ void require_hardware_consent(const PreparedSession& session, const RunOptions& 
 
 namespace {
 
-// By this process' terminal and kernel, and by PROXARM_TREAT_AS_REAL.
 HardwareSurroundings surroundings_here() {
   const char* const named = std::getenv("PROXARM_TREAT_AS_REAL");
   const std::string taken = named == nullptr ? "" : "," + std::string(named) + ",";

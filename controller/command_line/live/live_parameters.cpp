@@ -30,7 +30,7 @@ struct Live {
   double (*parse)(std::string_view text, std::string_view option);
 };
 
-// A time, or a word that choose_horizon() makes one of.
+// The value is a time, or a word such as auto from which choose_horizon() finds a time.
 bool is_lookahead(const std::string& text) { return text.compare(0, 10, "lookahead=") == 0; }
 
 bool is_tool(const std::string& text) {
@@ -74,7 +74,7 @@ double number_of(const std::string& text, const std::string& key, const std::str
   return *value;
 }
 
-// "X,Y,Z"
+// Parses "X,Y,Z".
 std::array<double, 3> three_numbers(const std::string& text, const std::string& key, const std::string& expected,
                                     double most) {
   std::array<double, 3> numbers{};
@@ -92,7 +92,7 @@ std::array<double, 3> three_numbers(const std::string& text, const std::string& 
 constexpr double most_friction = 10.0;
 constexpr double farthest_m = 10.0, farthest_centre_m = 1.0;
 
-// "NAME.friction=MU", "NAME.position_m=X,Y,Z". Nothing where there is no such key.
+// Parses "NAME.friction=MU" and "NAME.position_m=X,Y,Z"; nullopt for other keys.
 std::optional<Change> change_of_object(const std::string& text, const scenes::Scene& scene) {
   const std::size_t equals = text.find('='), dot = text.rfind('.', equals);
   if (equals == std::string::npos || dot == std::string::npos) return {};
@@ -140,7 +140,7 @@ void LiveParameters::follow(double period_s) {
   if (period_s != session_.settings.period_s) session_ = with_timestep(session_, named(period_s), period_s);
 }
 
-// So that a message names it.
+// Options with the present mass, so that an error names it.
 RunOptions LiveParameters::named(double period_s) const {
   RunOptions judged = options_;
   judged.mass_kg = session_.settings.mass_kg;
@@ -205,7 +205,7 @@ controller::Change LiveParameters::take(const std::string& text) {
   }
   choose_horizon(changed);
   RunOptions judged = options_;
-  judged.mass_kg = changed.settings.mass_kg;  // so that the message names it
+  judged.mass_kg = changed.settings.mass_kg;  // so that the error names it
   require_stable(changed, judged);
   session_ = std::move(changed);
   const double handle_kg = parameter.parameter == Parameter::mass ? session_.cell.tool.mass_kg : 0.0;
@@ -293,10 +293,10 @@ struct Script {
 
 struct TimedText {
   double time_s;
-  std::string text, time;  // time: as it was written
+  std::string text, time;  // time: as written
 };
 
-// "mass=3@4s", after four seconds of rendering, in the order of their times. Throws SetupError.
+// Parses "mass=3@4s" (after four seconds of rendering) and sorts by time. Throws SetupError.
 std::vector<TimedText> timed_texts(const std::vector<std::string>& texts) {
   std::vector<TimedText> timed;
   for (const std::string& text : texts) {
@@ -315,8 +315,8 @@ std::vector<TimedText> timed_texts(const std::vector<std::string>& texts) {
   return timed;
 }
 
-// What take() makes of a change. What refuses it may be about something else: more mass is asked for where a timestep
-// is set. The message names the line that the change comes from, and that behind it.
+// Calls take() on a change. The refusal may concern another quantity: a new timestep may need a larger mass. So the
+// error names the change and its line, followed by that quantity.
 template <typename Take>
 auto taken_from(const std::string& line, const std::string& change, Take take) {
   try {
@@ -348,7 +348,7 @@ Script script_of(const std::vector<std::string>& texts, const PreparedSession& s
   return script;
 }
 
-// What an order through the socket does; the answer. Nothing: the line is no order.
+// Gives an order from the socket to the session; returns the answer. nullopt: the line isn't an order.
 std::optional<std::string> obey(controller::Cycle& cycle, const std::string& line) {
   const auto command = parse_order(line);
   if (!command) return std::nullopt;
@@ -367,7 +367,7 @@ std::vector<std::string> split_at_tabs(const std::string& line) {
 
 bool is_of_tool(const Change& change) { return change.parameter == Parameter::tool; }
 
-// All of a line's changes or, where one of them is refused, none.
+// Makes all changes of a line or, if one is refused, none.
 void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std::vector<std::string>& texts) {
   LiveParameters changed = parameters;
   std::vector<Change> changes;
@@ -377,7 +377,7 @@ void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std:
              "set the others when the drives have confirmed it: what they may be depends on it");
     }
     const Change change = taken_from(text, text, [&](const std::string& one) { return changed.take(one); });
-    // A tool has its mass and its centre at once: they are judged together, and the second has both.
+    // The tool's mass and centre are checked together: the later change holds both, so the earlier one is dropped.
     if (change.parameter == Parameter::tool) std::erase_if(changes, is_of_tool);
     changes.push_back(change);
   }
@@ -391,7 +391,7 @@ void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std:
   parameters = std::move(changed);
 }
 
-// What changes through the socket do; the answer.
+// Makes the changes of a line from the socket; returns the answer.
 std::string change(controller::Cycle& cycle, LiveParameters& parameters, const std::string& line) {
   if (cycle.status().changes_timestep() || cycle.status().answered_timesteps() != parameters.asked_timesteps()) {
     refuse(line, "a timestep that is being changed", "a session that has one", "ask again in a moment");

@@ -1,8 +1,7 @@
-// The parameters of a session that may change while it runs, as text: "mass=3", "damping=20Ns/m", "spring=0"; of an
-// object by its name "wall.friction=0.5", "plate.position_m=0.1,0,0".
+// Changes the parameters of a running session by text: "mass=3", "damping=20Ns/m", "spring=0"; for an object by its
+// name "wall.friction=0.5", "plate.position_m=0.1,0,0".
 //
-// Each change is judged as it would be at the start, with what has been changed before; what is refused changes
-// nothing.
+// Each change is checked as at the start, together with earlier changes. A refused change has no effect.
 #pragma once
 
 #include <memory>
@@ -19,20 +18,20 @@ namespace proxarm::command_line {
 
 class LiveParameters {
  public:
-  // `force_unstable` as in RunOptions. `session` must outlive it.
+  // `force_unstable` as in RunOptions. Precondition: `session` outlives this object.
   LiveParameters(const PreparedSession& session, const RunOptions& options);
 
   // Throws SetupError.
   controller::Change take(const std::string& text);
-  // Throws SetupError where the session's sensor denies the tool that has changed since `before`.
+  // Throws SetupError if the tool has changed since `before` and the sensor's readings contradict the new one.
   void require_tool(const LiveParameters& before, const controller::ToolEvidence& seen) const;
-  // "timestep=2ms".
+  // Returns whether the text is like "timestep=2ms".
   [[nodiscard]] static bool is_timestep(const std::string& text);
-  // Judged by what the start judges it by, as far as it depends on T. Throws SetupError.
+  // Repeats those checks of the start that depend on T. Throws SetupError.
   controller::Timestep take_timestep(const std::string& text);
-  // What the session's timestep really is: drives may have refused the last one.
+  // Takes over the session's actual timestep: drives may have refused the last change.
   void follow(double period_s);
-  // Of those that were handed on.
+  // Counts the timesteps that were passed on to the session.
   void count_timestep() noexcept { ++asked_timesteps_; }
   [[nodiscard]] std::uint32_t asked_timesteps() const noexcept { return asked_timesteps_; }
 
@@ -46,30 +45,30 @@ class LiveParameters {
   std::uint32_t asked_timesteps_ = 0;
 };
 
-// Throws SetupError that names `key` where nothing of the session can be changed or ordered.
+// Throws SetupError that names `key` if the session takes neither changes nor orders.
 void require_changeable(const PreparedSession& session, const std::string& key);
 
-// Of the script and the socket, before a bus is opened. Throws SetupError.
+// Checks the changes of the script and the socket before a bus is opened. Throws SetupError.
 void require_changes(const PreparedSession& session, const RunOptions& options);
 
-// A change of the script that did nothing.
+// A change of the script that had no effect.
 struct IdleChange {
-  std::string text;     // as it was given, without its time
-  double time_s = 0.0;  // of rendering
-  const char* refusal;  // why
+  std::string text;     // as given, without its time
+  double time_s = 0.0;  // rendering time
+  const char* refusal;  // why it had no effect
 };
-// Of a session that has ended; `texts` are those of its options.
+// Call it after the session; `texts` are the changes in the options.
 std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::vector<std::string>& texts);
 
-// The session's script. Before the first cycle; throws SetupError.
+// Schedules the session's script. Call it before the first cycle; throws SetupError.
 void schedule_changes(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options);
 
-// What orders and changes do to the session while it runs, from any threads. What is asked of it is read in `box`. All
-// must outlive the handlers.
+// Returns handlers of orders and changes to the running session, for any thread. They read the session's status from
+// `box`. Precondition: all arguments outlive the handlers.
 ControlHandlers control_handlers(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options,
                                  const controller::BoxReader& box);
 
-// The session's socket, where one is wanted; null without.
+// Opens the session's socket if wanted; else returns null.
 std::unique_ptr<ControlSocket> control_socket(const RunOptions& options, ControlHandlers handlers);
 
 }  // namespace proxarm::command_line

@@ -33,13 +33,13 @@ std::string first_word(const std::string& file) {
   return word;
 }
 
-// Pages of the stack that the cycle may come to are there before it does.
+// Touches the pages of the stack that the cycle may use, so that none faults during a cycle.
 __attribute__((noinline)) void touch_stack() noexcept {
   std::array<volatile char, stack_bytes> room;
   for (std::size_t i = 0; i < room.size(); i += 1024) room[i] = 0;
 }
 
-// The last processor that this process may use: the first ones get most interrupts.
+// Returns the last processor that this process may use, because the first ones get most interrupts.
 int last_processor() noexcept {
   cpu_set_t allowed;
   if (sched_getaffinity(0, sizeof allowed, &allowed) != 0 || CPU_COUNT(&allowed) < 2) return -1;
@@ -100,7 +100,7 @@ RealtimeThread::RealtimeThread() {
   }
   touch_stack();
   const int cpu = last_processor();
-  if (scheduled_) pin(cpu);  // without priority, staying where others run would be worse than moving
+  if (scheduled_) pin(cpu);  // without priority, a fixed processor shared with other threads would be worse than moving
   check_kernel();
   check_governor(cpu);
   sleep_states_ = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);

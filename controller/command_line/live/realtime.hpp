@@ -1,11 +1,11 @@
-// Real-time scheduling for the thread of the cycle, as far as the machine grants it.
+// Real-time scheduling for the thread of the cycle, as far as the machine permits.
 #pragma once
 
 namespace proxarm::command_line {
 
-// While it lives, the calling thread runs under SCHED_FIFO on one processor, its stack is touched, the process' memory
-// is locked, and processors don't sleep deeply. What the machine doesn't grant, or isn't set up for, is said on
-// standard error, a line each with what it means and what helps, and done without.
+// During its lifetime the calling thread runs under SCHED_FIFO on one processor, its stack is touched, the process's
+// memory is locked, and processors don't sleep deeply. A measure that the machine doesn't permit is left out, with a
+// line on standard error that names the effect and a remedy.
 class RealtimeThread {
  public:
   RealtimeThread();

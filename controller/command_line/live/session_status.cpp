@@ -18,20 +18,20 @@ using controller::Fault;
 using controller::RecordFlag;
 using description::Json;
 
-// Over which the tool's speed is told: encoders' steps are far below what moves in it.
+// The tool's speed is averaged over this many cycles, so that the encoders' steps don't matter.
 constexpr std::uint64_t speed_cycles = 20;
 
 struct Status {
   CycleRecord record;
   std::uint64_t cycles = 0;
   double rendered_s = 0.0, delay_s = 0.0, felt_mass_kg = 0.0, damping_Ns_per_m = 0.0, tool_speed_m_per_s = 0.0;
-  std::string touches;  // the object's name; empty: nothing
+  std::string touches;  // the object's name; empty: no contact
   std::vector<std::string> limits;
 };
 
-// Nothing before the first cycle.
+// nullopt before the first cycle.
 std::optional<Status> present(const controller::BoxReader& box, const PreparedSession& session) {
-  // A cycle is some kilobytes; not on this thread's stack.
+  // A cycle has some kilobytes, too much for this thread's stack.
   const auto now = std::make_unique<BoxCycle>(), before = std::make_unique<BoxCycle>();
   Status status;
   status.cycles = box.cycles();

@@ -1,5 +1,5 @@
-// How a running session is: the answer to "status" on its socket, read from the black box's memory while the cycle
-// writes there. The cycle isn't involved.
+// The status of a running session: the answer to "status" on its socket. It is read from the black box's memory while
+// the cycle writes there, so the cycle isn't involved.
 #pragma once
 
 #include <optional>
@@ -10,8 +10,8 @@
 
 namespace proxarm::command_line {
 
-// To "status" a line of JSON, {"version": 1, "phase": "rendering", …}: docs/files.md#the-status-of-a-session; to
-// "status text" a line for people. Nothing: the line asks for something else. Any thread.
+// Answers "status" with a line of JSON, {"version": 1, "phase": "rendering", …}: docs/files.md#the-status-of-a-session;
+// answers "status text" with a line for people. nullopt: the line asks for something else. Any thread may call it.
 std::optional<std::string> session_status(const std::string& line, const controller::BoxReader& box,
                                           const PreparedSession& session);
 

@@ -19,7 +19,7 @@
 namespace proxarm::command_line {
 namespace {
 
-// Each one's default is to end or (SIGTSTP) to suspend the process.
+// The signals whose default is to end or (SIGTSTP) to suspend the process.
 std::vector<int> ending_signals() {
   std::vector<int> all{SIGHUP,  SIGINT,  SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2,   SIGALRM, SIGVTALRM,
                        SIGPROF, SIGXCPU, SIGXFSZ, SIGPOLL, SIGPWR,  SIGSTKFLT, SIGTSTP};
@@ -30,14 +30,14 @@ constexpr std::array ignored_signals{SIGPIPE, SIGTTIN, SIGTTOU};
 
 constexpr unsigned char end_of_watch = 0;  // no signal has this number
 
-// Where the handler writes the signal's number; what it may do is async-signal-safe.
+// The handler writes the signal's number here. The handler must be async-signal-safe.
 std::atomic<int> wake_up{-1};
 static_assert(std::atomic<int>::is_always_lock_free);
 
 extern "C" void note_signal(int signal) {
   const int saved = errno;
   const auto number = static_cast<unsigned char>(signal);
-  // A full pipe holds signals enough: the stop was asked for already.
+  // If the pipe is full, an earlier signal has asked for the stop already.
   [[maybe_unused]] const ssize_t written = write(wake_up.load(std::memory_order_relaxed), &number, 1);
   errno = saved;
 }
@@ -52,7 +52,7 @@ struct Output {
   EndingCause lost;
 };
 
-// Standard input is watched as the terminal only: at the end of a pipe nothing has been lost.
+// Standard input is watched only if it is a terminal: the end of a pipe isn't a loss.
 std::vector<Output> watched_outputs() {
   std::vector<Output> outputs;
   const EndingCause terminal{"terminal_lost", "the terminal was lost"};
@@ -97,7 +97,7 @@ struct SignalWatch::State {
     on_ending();
   }
 
-  // Until end_of_watch. Asks for no event of an output: errors and hang-ups come by themselves.
+  // Watches until end_of_watch. poll() reports errors and hang-ups of the outputs without being asked for events.
   void watch() {
     const std::vector<Output> outputs = watched_outputs();
     std::vector<pollfd> polled{{pipe[0], POLLIN, 0}};
@@ -111,7 +111,7 @@ struct SignalWatch::State {
       }
       for (std::size_t i = 0; i < outputs.size(); ++i) {
         if (polled[i + 1].revents == 0) continue;
-        polled[i + 1].fd = -1;  // told once
+        polled[i + 1].fd = -1;  // reported once
         end(outputs[i].lost);
       }
     }
@@ -142,7 +142,7 @@ SignalWatch::SignalWatch(std::function<void()> on_ending) : state_(std::make_uni
 
 SignalWatch::~SignalWatch() {
   for (const State::Handled& h : state_->handled) sigaction(h.signal, &h.before, nullptr);
-  while (write(state_->pipe[1], &end_of_watch, 1) < 0) {  // full of signals, which the thread takes
+  while (write(state_->pipe[1], &end_of_watch, 1) < 0) {  // the pipe is full of signals, which the thread reads
     if (errno == EAGAIN) std::this_thread::yield();
   }
   state_->thread.join();

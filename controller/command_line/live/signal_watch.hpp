@@ -1,10 +1,9 @@
-// Whatever asks a session to end from outside, turned into a controlled stop: every signal that would end or suspend
-// the process and can be caught, a terminal that is gone, and a standard output or error that nobody reads any more.
+// Turns outside requests to end the session into a controlled stop: every catchable signal that would end or suspend
+// the process, a lost terminal, and a standard output or error without a reader.
 //
 // Not caught: SIGKILL and SIGSTOP, which can't be, and the signals of a crash (SIGSEGV, SIGBUS, SIGFPE, SIGILL,
-// SIGABRT, SIGTRAP, SIGSYS), after which nothing of this process is to be trusted: the drives' own watchdogs stop the
-// arm. SIGPIPE, SIGTTIN and SIGTTOU are ignored: writing fails instead, and the watch sees why. SIGHUP stays ignored
-// where the session was started with nohup, which asks for that.
+// SIGABRT, SIGTRAP, SIGSYS), after which only the drives' own watchdogs can be trusted. SIGPIPE, SIGTTIN and SIGTTOU
+// are ignored: writing fails instead, and the watch finds the cause. SIGHUP stays ignored under nohup.
 #pragma once
 
 #include <functional>
@@ -15,18 +14,18 @@ namespace proxarm::command_line {
 
 struct EndingCause {
   std::string word = "signal";  // for programs: "signal", "output_closed", "terminal_lost"
-  std::string text;             // for people: "SIGHUP", "standard output was closed"; empty: nothing has come
+  std::string text;             // for people: "SIGHUP", "standard output was closed"; empty: no cause yet
 };
 
 class SignalWatch {
  public:
-  // `on_ending` runs in the watch's own thread, once per cause, until the destructor returns. One watch at a time.
+  // `on_ending` runs in the watch's thread, once per cause, until the destructor returns. Only one watch may exist.
   explicit SignalWatch(std::function<void()> on_ending);
   SignalWatch(const SignalWatch&) = delete;
   SignalWatch& operator=(const SignalWatch&) = delete;
-  ~SignalWatch();  // signals act as before, but for SIGPIPE, which stays ignored
+  ~SignalWatch();  // restores the signals' actions, except for SIGPIPE, which stays ignored
 
-  // Any thread: what came first.
+  // Returns the first cause. Any thread may call it.
   [[nodiscard]] EndingCause cause() const;
 
  private:
@@ -34,7 +33,7 @@ class SignalWatch {
   std::unique_ptr<State> state_;
 };
 
-// For a process that outlives the session's end to tell of it: none of the above ends or suspends it.
+// After this call none of these signals ends or suspends the process, so that it can still report the session's end.
 void ignore_ending_signals() noexcept;
 
 }  // namespace proxarm::command_line

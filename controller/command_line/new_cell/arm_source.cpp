@@ -17,12 +17,12 @@ using description::in_quotes;
 using description::SetupError;
 using tinyxml2::XMLElement;
 
-// Software limits this far within the URDF's: setpoints overshoot a little.
+// Distance of the cell's limits from the URDF's, since setpoints overshoot a little.
 constexpr double range_margin_rad = 0.02, range_margin_m = 0.005;
-// Of joints without limits ("continuous", or limits that are both zero): less than a turn to each side.
+// Range of joints without limits ("continuous", or both limits 0): less than a turn to each side.
 constexpr double unlimited_rad = 3.1, unlimited_m = 1.0;
 
-// An attribute of <limit>; 0 where it isn't there.
+// Returns an attribute of <limit>; 0 if it is missing.
 double limit_of(const UrdfTreeJoint& joint, const XMLElement* limit, const char* name, const fs::path& file) {
   double value = 0.0;
   const auto read = limit->QueryDoubleAttribute(name, &value);
@@ -64,19 +64,18 @@ ChainJoint described(const UrdfTreeJoint& joint, const fs::path& file, std::vect
                       (out.slides ? " m" : " rad") + " are taken");
   }
   const double margin = std::min(out.slides ? range_margin_m : range_margin_rad, 0.05 * (high - low));
-  // More than a turn to each side is of no use to a hand, and costs the search for a start.
+  // More than a turn to each side doesn't help a hand, and slows the search for a start.
   const double most = out.slides ? 10.0 : 6.2;
   const auto rounded = [](double x) { return std::round(1e3 * x) / 1e3; };
   out.range = {rounded(std::max(low + margin, -most)), rounded(std::min(high - margin, most))};
   return out;
 }
 
-// All but the chain's joints stand still.
 void fix_others(UrdfTree& tree, const UrdfTree::Path& chain, std::vector<std::string>& remarks) {
   for (UrdfTreeJoint& joint : tree.joints()) {
     const bool on_chain = std::find(chain.begin(), chain.end(), &joint) != chain.end();
     if (on_chain) continue;
-    // Of no meaning, and often written as "0 0 0", which no axis is.
+    // A fixed joint's axis has no meaning, and often is an invalid "0 0 0".
     while (auto* axis = joint.element->FirstChildElement("axis")) joint.element->DeleteChild(axis);
     if (joint.type == "fixed") continue;
     while (auto* mimic = joint.element->FirstChildElement("mimic")) joint.element->DeleteChild(mimic);
@@ -86,7 +85,7 @@ void fix_others(UrdfTree& tree, const UrdfTree::Path& chain, std::vector<std::st
   }
 }
 
-// "package://NAME/rest" and "file://…" as a path; empty where there is no such file, or none that is drawn.
+// Converts "package://NAME/rest" and "file://…" to a path; empty if there is no such file or it can't be drawn.
 std::string mesh_place(const std::string& name, const fs::path& urdf, const Packages& packages) {
   fs::path place = name.starts_with("file://") ? fs::path(name.substr(7)) : fs::path(name);
   if (name.starts_with("package://")) {
@@ -105,7 +104,7 @@ std::string mesh_place(const std::string& name, const fs::path& urdf, const Pack
   return drawn && fs::is_regular_file(place, ignored) ? fs::absolute(place).lexically_normal().string() : "";
 }
 
-// Each link is drawn as its visuals, or as its collision shapes where their meshes can't be read (Collada).
+// Draws each link by its visuals, or by its collision shapes if the visuals' meshes can't be read (Collada).
 void place_shapes(UrdfTree& tree, const fs::path& file, const Packages& packages, std::vector<std::string>& remarks) {
   std::size_t lost = 0;
   for (const auto& named : tree.links()) {
@@ -145,7 +144,6 @@ void place_shapes(UrdfTree& tree, const fs::path& file, const Packages& packages
                     " links aren't there or are none that is drawn (STL, OBJ, PLY): --package NAME=DIR says where");
 }
 
-// Of a joint between base and sensor.
 void require_drivable(const UrdfTreeJoint& joint, const fs::path& file) {
   if (joint.moves() && !(joint.axis().norm() > 0.0)) {
     throw SetupError({.file = file.string(),

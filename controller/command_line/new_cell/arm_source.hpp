@@ -1,4 +1,4 @@
-// From a URDF or xacro as makers publish it to the chain of one to seven joints that proxarm moves.
+// Converts a maker's URDF or xacro to the chain of one to seven joints that proxarm moves.
 #pragma once
 
 #include <array>
@@ -13,26 +13,27 @@ namespace proxarm::command_line {
 struct ChainJoint {
   std::string name;
   bool slides = false;
-  std::array<double, 2> range{};  // rad or m: the URDF's limits less a little
-  double max_speed = 0.0;         // 0: not said
-  double max_effort = 0.0;        // Nm or N; 0: not said
+  std::array<double, 2> range{};  // rad or m: the URDF's limits with a small margin
+  double max_speed = 0.0;         // 0: not stated
+  double max_effort = 0.0;        // Nm or N; 0: not stated
 };
 
 struct ArmSource {
   std::string name;                  // of the robot
   std::string tip;                   // link that carries the sensor
   std::vector<ChainJoint> joints;    // outwards from the base
-  std::string urdf;                  // what is written: the chain's joints move, all others are fixed
-  std::vector<std::string> remarks;  // what was changed and estimated, a line each
+  std::string urdf;                  // written beside the cell: the chain's joints move, all others are fixed
+  std::vector<std::string> remarks;  // changes and estimates, a line each
 };
 
-// Reads the file, by the program xacro where it is one, and makes a URDF of it that an arm can be built from:
-//   - The chain goes from the root to --tip. Without it, it goes to where the moving joints end or branch (a gripper's
-//     fingers), and there to the link that is called tool0 or flange, if there is one.
-//   - Joints beside the chain, mimic ones among them, are fixed at their zero.
-//   - Links on the chain without an <inertial> that a body has get an estimate (link_inertia.hpp).
-//   - Meshes are named by their places (package:// by --package and ROS_PACKAGE_PATH). Those that can't be drawn are
-//     left out.
+// Reads the file, a xacro through the program xacro, and makes a URDF of it from which an arm can be built:
+//   - The chain goes from the root to --tip. Without --tip it goes to where the moving joints end or branch (a
+//     gripper's
+//     fingers), and on to the link called tool0 or flange there, if any.
+//   - Joints beside the chain, mimic joints included, are fixed at their zero.
+//   - Links on the chain without a physical <inertial> get an estimate (link_inertia.hpp).
+//   - Meshes get their file paths (package:// by --package and ROS_PACKAGE_PATH). Meshes that can't be drawn are left
+//     out.
 // Throws SetupError.
 ArmSource read_arm(const NewCellOptions& options);
 

@@ -19,7 +19,7 @@ std::string number(double x) {
   return number;
 }
 
-// A name out of a URDF, which may have any characters: quoted where YAML would take it for something else.
+// A name from a URDF, which may have any characters; quoted if YAML would misread it.
 std::string scalar(const std::string& text) {
   const auto plain = [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '/';
@@ -42,10 +42,9 @@ std::string pose(const description::PoseDescription& X) {
   return "{position_m: " + list(X.position_m) + ", rpy_rad: " + list(X.rpy_rad) + "}";
 }
 
-// Keys and what they say.
 using Keys = std::vector<std::pair<std::string, std::string>>;
 
-// Keys that all drives usually share, and those that their `simulation` maps do.
+// Keys that drives usually have in common, and those of their `simulation` maps.
 Keys common_keys(const description::DriveDescription& d) {
   Keys keys{{"profile", "cia402"}, {"mode", "csp"}};
   if (!d.eds.empty()) keys.emplace_back("eds", scalar(d.eds));
@@ -65,7 +64,7 @@ Keys common_keys(const description::SimulatedDrive& s) {
           {"servo_rate_Hz", number(s.servo_rate_Hz)}};
 }
 
-// Those of the first drive's that all others have, too.
+// Returns the first drive's keys that all other drives have with the same value.
 template <class Of>
 Keys shared(const std::vector<description::DriveDescription>& drives, Of of) {
   Keys all = of(drives.front());
@@ -93,7 +92,7 @@ std::string in_lines(const std::string& name, const Keys& keys) {
   return text;
 }
 
-// In lines: who it is, what it has otherwise than others, how far it goes, its gear, and how it is simulated.
+// Writes a drive in lines: name and place, what differs from other drives, range, gear, simulation.
 std::string drive_text(const description::DriveDescription& d, const Keys& own, const Keys& simulated) {
   const Keys who{{"joint", scalar(d.joint)}, {"bus", d.bus}, {"node", std::to_string(d.node)}};
   const Keys range{{"range_rad", list(d.range_rad)},
@@ -124,7 +123,6 @@ std::string drives_text(const std::vector<description::DriveDescription>& drives
   return text;
 }
 
-// In lines of a comment.
 std::string commented(const std::string& text) {
   constexpr std::size_t width = 116;
   std::string out, line = "#";

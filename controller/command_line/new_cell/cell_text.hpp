@@ -1,4 +1,4 @@
-// A cell as a file that somebody reads and changes.
+// Writes a cell as a file that people read and change.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace proxarm::command_line {
 
-// The keys that a new cell needs, with what to look up for a real arm. Files are named as they lie beside the cell.
-// `remarks` stand at its top.
+// The text has the keys that a new cell needs, with what to look up for a real arm. Files are named relative to the
+// cell. `remarks` become comments at the top.
 std::string cell_text(const description::Cell& cell, const std::vector<std::string>& remarks, bool with_scene,
                       const std::string& sensor_keys);
 

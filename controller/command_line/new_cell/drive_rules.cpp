@@ -21,18 +21,18 @@ constexpr int poses = 200;
 constexpr double rotor_share = 0.5, least_rotor_share = 0.03;
 constexpr double gear_Hz = 25.0, stiffest_gear_Hz = 150.0, least_stiffness_share = 0.1, damping_ratio = 0.05;
 constexpr double hand_N = 100.0;
-// A tenth of a drive's torque is for friction and for the speeds of other joints; links may weigh a fifth more.
+// A tenth of a drive's torque is for friction and the other joints' motion; links may weigh a fifth more than stated.
 constexpr double torque_share = 0.9, weight_margin = 1.2;
-// limits.max_force_N is at most what sensor and handle bear, and at least what a new cell's first hands need.
+// The largest force that sensor and handle bear, and the smallest that the default hands need.
 constexpr double most_force_N = 200.0, least_force_N = 60.0;
-// Accelerations as shares of the speed: the usual one (a 15th of a second to full speed), and the least that a drive is
-// believed to be made for.
+// Accelerations divided by the speed, 1/s: the usual one (full speed in a 15th of a second), and the least plausible
+// one.
 constexpr double usual_per_s = 15.0, least_per_s = 3.0;
 constexpr double fastest_rad_per_s = 4.0, fastest_m_per_s = 1.0, usual_rad_per_s = 2.0, usual_m_per_s = 0.5;
 
 struct Load {
   double mean_inertia = 0.0, most_inertia = 0.0, most_gravity = 0.0;
-  double most_lever = 0.0;  // of a force at the tool, m; 1 of a joint that slides
+  double most_lever = 0.0;  // lever of a force at the tool, m; 1 for a joint that slides
 };
 
 std::vector<Load> loads_of(const models::Arm& arm) {
@@ -56,7 +56,7 @@ std::vector<Load> loads_of(const models::Arm& arm) {
 
 double squared(double x) { return x * x; }
 
-// Two digits are all that a rule of thumb is worth: the unit of the second one.
+// The unit of x's second digit: rules of thumb are good for two digits.
 double second_digit(double x) { return std::pow(10.0, std::floor(std::log10(x)) - 1.0); }
 
 double rounded(double x) { return x > 0.0 ? std::round(x / second_digit(x)) * second_digit(x) : 0.0; }
@@ -68,9 +68,9 @@ double left_Nm(double torque_Nm, const Load& load) {
   return torque_share * torque_Nm - weight_margin * load.most_gravity;
 }
 
-// What a cell may say of a drive ends somewhere, and arms of kilometres or of a thousand tons are mistakes.
+// Refuses arms of kilometres or of a thousand tons, which are mistakes and exceed the range of a cell's keys.
 void require_possible(const models::Arm& arm, const description::DriveDescription& drive, const fs::path& urdf) {
-  constexpr double most_Nm = 1e6;  // of max_torque_Nm in cell files
+  constexpr double most_Nm = 1e6;  // largest max_torque_Nm in cell files
   if (drive.max_torque_Nm <= most_Nm) return;
   char found[160];
   std::snprintf(found, sizeof found, "an arm that reaches %.3g m and takes %.3g Nm at joint %.60s",
@@ -82,7 +82,7 @@ void require_possible(const models::Arm& arm, const description::DriveDescriptio
                                            "arm weighs where the URDF doesn't"});
 }
 
-// The drive's torque, and the acceleration that it has for it in the worst pose, with the arm's weight on it.
+// Chooses the drive's torque, and its acceleration in the worst pose, in which it also bears the arm's weight.
 void choose_torque(const ChainJoint& joint, const Load& load, double rotor, description::DriveDescription& drive,
                    std::vector<std::string>& remarks) {
   const double inertia = load.most_inertia + rotor, speed = drive.max_speed_rad_per_s;

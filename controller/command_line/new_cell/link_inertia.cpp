@@ -12,19 +12,20 @@ namespace {
 using models::Vec3;
 using tinyxml2::XMLElement;
 
-// Of an arm, times its reach cubed: a collaborative arm of a metre has 20 to 30, an industrial one of 2.5 m 70.
+// Mass of an arm divided by its reach cubed. Collaborative arms of 1 m have 20 to 30 kg/m³, industrial ones of 2.5 m
+// have 70.
 constexpr double usual_kg_per_m3 = 40.0;
-// What an axis that turns gives at most, over the weight of the arm beyond it when stretched: 1.4 to 2 where makers say
-// both. More than an arm can lift it doesn't weigh; but efforts are often placeholders, and less than a third of what
-// is usual no arm of this reach weighs.
+// Largest torque of a revolute joint divided by the torque of the stretched arm's weight: 1.4 to 2 where makers state
+// both. An arm isn't heavier than its joints can lift. But efforts are often placeholders, and no arm weighs less than
+// a third of what is usual for its reach.
 constexpr double effort_over_weight = 1.4, least_of_usual = 1.0 / 3.0;
 constexpr double gravity_m_per_s2 = 9.80665;
-constexpr double least_reach_m = 0.1;  // of an arm that only slides, or whose joints are in one place
-// Less is a placeholder: a gram, and a gram's moment at 3 mm.
+constexpr double least_reach_m = 0.1;  // for an arm that only slides, or whose joints are in one place
+// Smaller values are placeholders: a gram, and a gram's moment at 3 mm.
 constexpr double least_mass_kg = 1e-3, least_moment_kg_m2 = 1e-8;
 
-// What <inertial> says, where a body can have it: MuJoCo refuses principal moments of which one is larger than the
-// other two together, and that is how inertia tensors look whose numbers were put into the wrong places.
+// What a link's <inertial> states, if it is physical. MuJoCo refuses a principal moment larger than the sum of the
+// other two, which happens when a tensor's numbers are in the wrong places.
 enum class Inertial { missing, mass_alone, whole };
 Inertial inertial_of(const XMLElement* link) {
   const XMLElement* inertial = link->FirstChildElement("inertial");
@@ -43,7 +44,7 @@ Inertial inertial_of(const XMLElement* link) {
   return of_a_body ? Inertial::whole : Inertial::mass_alone;
 }
 
-// A rod from the link's joint to the next one, a tenth of it (and at least 4 cm) thick.
+// A rod from the link's joint to the next one, with a diameter of a tenth of its length, at least 8 cm.
 void set_rod(XMLElement* link, double mass_kg, const Vec3& to, double least_length_m) {
   while (auto* old = link->FirstChildElement("inertial")) link->DeleteChild(old);
   const double length = std::max(to.norm(), least_length_m), radius = std::max(0.05 * length, 0.04);
@@ -71,13 +72,13 @@ void set_rod(XMLElement* link, double mass_kg, const Vec3& to, double least_leng
   inertia->SetAttribute("izz", number(I(2, 2)).c_str());
 }
 
-// A link of the chain that moves, and where the next one's joint is in it; fixed joints between are counted in.
+// A moving link of the chain, and the next joint's place in it; fixed joints between are included.
 struct MovingLink {
   XMLElement* element;
   Vec3 to_next = Vec3::Zero();
 };
 
-// The effort of the strongest joint that turns; 0 where none is said.
+// The largest effort of a joint that turns; 0 if none is stated.
 double strongest_Nm(const UrdfTree::Path& path) {
   double most = 0.0;
   for (const UrdfTreeJoint* joint : path) {
@@ -90,8 +91,8 @@ double strongest_Nm(const UrdfTree::Path& path) {
   return most;
 }
 
-// Of an arm whose links have these shares of its mass, by its reach and by what its joints give: stretched from the
-// first one, with d_k from there to the middle of link k, its weight is g m Σ share_k d_k.
+// Estimates the arm's mass m by its reach and its joints' efforts. Stretched, with d_k from the first joint to the
+// middle of link k, the torque of its weight is g m Σ share_k d_k.
 double estimated_mass_kg(const UrdfTree::Path& path, const std::vector<MovingLink>& moving,
                          const std::vector<double>& share, double shares, double reach_m) {
   const double usual_kg = usual_kg_per_m3 * std::pow(reach_m, 3);
@@ -111,7 +112,7 @@ double estimated_mass_kg(const UrdfTree::Path& path, const std::vector<MovingLin
 void estimate_inertia(UrdfTree& tree, const UrdfTree::Path& path, std::optional<double> said_kg,
                       std::vector<std::string>& remarks) {
   std::vector<MovingLink> moving;
-  double reach_m = 0.0;  // from the first joint on: what stands below it is no part of the arm's reach
+  double reach_m = 0.0;  // from the first joint on, as a pedestal below it isn't part of the reach
   for (const UrdfTreeJoint* joint : path) {
     if (!moving.empty()) {
       reach_m += joint->origin().norm();

@@ -1,4 +1,4 @@
-// The program behind `proxarm new-cell`, which becomes it. Apart, because nobody needs it twice.
+// The program that `proxarm new-cell` becomes. It is separate because it is used once for an arm.
 //
 // Exit status: 0 fine, 2 set-up mistake.
 #include <CLI/CLI.hpp>

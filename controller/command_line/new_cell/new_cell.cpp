@@ -33,11 +33,11 @@ namespace {
 namespace fs = std::filesystem;
 using description::SetupError;
 
-// The wall is this far in front of the start, as the hand of the default cell expects it.
+// Distance of the wall from the start, as the default cell's hand expects it.
 constexpr double wall_ahead_m = 0.2;
-// Below it, a tenth of the hand's way is a tenth of all that the tool can reach.
+// With a smaller reach, a tenth of the hand's path is already a tenth of all that the tool can reach.
 constexpr double small_reach_m = 0.25;
-// Of the mass above the least that was steady: what is tried are two hands, and gears that are estimates.
+// Factor on the least steady mass: only two hands are tried, and the gears are estimates.
 constexpr double margin = 1.25;
 
 void write(const fs::path& file, const std::string& text) {
@@ -47,7 +47,7 @@ void write(const fs::path& file, const std::string& text) {
   if (!out) throw SetupError({.file = file.string(), .message = "can't be written"});
 }
 
-// The robot's name as a folder's: what shells and paths take for something else becomes "_".
+// The robot's name as a folder name: characters that shells or paths treat specially become "_".
 std::string folder_name(std::string name) {
   for (char& c : name) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '.') c = '_';
@@ -59,7 +59,8 @@ class NewCell {
  public:
   explicit NewCell(const NewCellOptions& options) : options_(options), source_(read_arm(options)) {
     folder_ = options.out.empty() ? fs::path(folder_name(source_.name)) : options.out;
-    // Until it is complete it has another name: what went wrong can be looked at, and the next try isn't in its way.
+    // The cell has this name until it is complete, so that a failed one can be inspected and doesn't block the next
+    // try.
     file_ = folder_ / "unfinished-cell.yaml";
     std::error_code ignored;
     if (!options.force && fs::exists(folder_ / "cell.yaml", ignored)) {
@@ -97,7 +98,7 @@ class NewCell {
     choose();
   }
 
-  // The user wrote the arm's file, not the cell that was tried: what is wrong with that is said of the arm.
+  // The user wrote the arm's file, not the cell that was tried, so errors in that cell name the arm's file.
   [[nodiscard]] SetupError in_terms_of_the_arm(const SetupError& error) const {
     description::SetupProblem problem = error.problem();
     const fs::path mine[] = {file_, folder_ / "arm.urdf", fs::absolute(file_), fs::absolute(folder_ / "arm.urdf")};
@@ -122,7 +123,7 @@ class NewCell {
     }
     fs::copy_file(file, folder_ / "sensor.yaml", fs::copy_options::overwrite_existing);
     if (sensor_.protocol == "ati_net_can_oem") {
-      // Before all others on a bus that it shares.
+      // Sent before all other frames on a shared bus.
       sensor_keys_ = "  base_id: 0x12\n  sample_rate_Hz: 7147\n  bandwidth_Hz: 800\n";
       return;
     }
@@ -180,8 +181,8 @@ class NewCell {
     cell_.sensor.pose_link.rpy_rad = {rounded(ypr[2]), rounded(ypr[1]), rounded(ypr[0])};
   }
 
-  // The smallest mass that is stable with margins from this start; infinite: none is, or the arm can't begin there.
-  // Leaves the files and remarks of this start.
+  // Returns the smallest mass that is stable with margins from this start; infinite if there is none or the arm can't
+  // start there. Leaves this start's files and remarks.
   double least_kg(const StartPose& start, const models::Arm& arm, const models::ToolSpace& space,
                   const description::HandDescription& hand) {
     constexpr double never = std::numeric_limits<double>::infinity();
@@ -197,8 +198,8 @@ class NewCell {
     }
   }
 
-  // Sorts the starts by the mass that they ask for. Masses within a fifth count as equal: there the better pose stays
-  // first.
+  // Sorts the starts by the mass that they need. Masses within a fifth of one another count as equal; among them the
+  // better pose comes first.
   void sort_by_mass(std::vector<StartPose>& starts, const models::Arm& arm, const models::ToolSpace& space,
                     const description::HandDescription& hand) {
     constexpr double step = 1.2;
@@ -210,7 +211,7 @@ class NewCell {
     for (std::size_t k = 0; k < starts.size(); ++k) starts[k] = judged[k].second;
   }
 
-  // Where the arm isn't steady from the best start, or can't begin there, others are tried.
+  // Takes the best start from which the arm is steady.
   void choose() {
     constexpr std::size_t judged = 8, most = 3;
     const models::Arm arm(cell_);
@@ -242,7 +243,7 @@ class NewCell {
   }
 
   [[noreturn]] void refuse_without_way(const models::Arm& arm) const {
-    const double reach_m = arm.path_curvature().maxCoeff();  // 1 of an arm with a joint that slides
+    const double reach_m = arm.path_curvature().maxCoeff();  // 1 for an arm with a joint that slides
     const bool small = reach_m > 0.0 && reach_m < small_reach_m;
     const std::string which =
         small ? "that reaches " + description::rounded_text(reach_m) + " m with its handle, and " : "";
@@ -275,8 +276,8 @@ class NewCell {
     write(folder_ / "scene.yaml", text);
   }
 
-  // For an arm that is too small for the default one's way of 0.22 m (without any room it holds still), or whose tool
-  // moves in a plane or on a line.
+  // Writes a hand for an arm that is too small for the default hand's path of 0.22 m (without any room the hand holds
+  // still), or whose tool moves in a plane or on a line.
   void write_hand(const description::HandDescription& hand, double share) {
     char text[200], way[80] = "a way that is turned to where the tool can go";
     if (share < 1.0) std::snprintf(way, sizeof way, "%.3g of its way: for that of 0.22 m the arm has no room", share);
@@ -297,10 +298,10 @@ class NewCell {
     cell_.default_hand = folder_ / "hand.yaml";
   }
 
-  // Axes in turn, as many on each bus, and fewest on the last one, which has the sensor.
+  // Places the axes in order, equally many on each bus, and fewest on the last one, which has the sensor.
   void place_on_buses(int count) {
     const int axes = static_cast<int>(cell_.drives.size());
-    constexpr double sensor_as_axes = 1.5;  // its frames are about as long as those of so many drives
+    constexpr double sensor_as_axes = 1.5;  // the sensor's frames are about as long as those of this many drives
     const int each = count == 1 ? axes : static_cast<int>(std::ceil((axes + sensor_as_axes) / count));
     cell_.buses.clear();
     for (int b = 0; b < count; ++b) {
@@ -313,7 +314,7 @@ class NewCell {
     cell_.sensor.bus = cell_.buses.back().name;
   }
 
-  // Whether these buses carry this timestep, with a window for the frames that is as short as possible.
+  // Returns whether these buses carry this timestep, with the shortest receive window that suffices.
   bool carries(int buses, double period_s) {
     place_on_buses(buses);
     cell_.default_period_s = period_s;
@@ -337,7 +338,7 @@ class NewCell {
                       .expected = "buses that carry a timestep of 10 ms or less"});
   }
 
-  // With the hand of the default scene, which moves in a plane, and in free space in all directions.
+  // Tries the hand of the default scene, which moves in a plane, and then free motion in all directions.
   std::optional<double> advised_mass() {
     const PreparedSession session = prepare(run_);
     controller::LoopModel loop = led_loop(session);
@@ -359,15 +360,14 @@ class NewCell {
     return free.steady;
   }
 
-  // The steady mass with this damping in the cell.
   std::optional<double> advised_mass_with(double damping_Ns_per_m) {
     cell_.default_damping_Ns_per_m = damping_Ns_per_m;
     save();
     return advised_mass();
   }
 
-  // A mass that hands lead easily needs no damping. Where a larger one is needed, or none is steady, the dampings that
-  // a hand takes for a heavier handle are tried, too; the least that saves a quarter of the mass is kept.
+  // A mass that hands lead easily needs no damping. For a larger one, or if none is steady, also tries dampings that a
+  // hand takes for a heavier handle, and keeps the least that saves a quarter of the mass.
   std::optional<double> advised_mass_and_damping() {
     constexpr double easy_kg = 10.0, worth = 0.75;
     const auto without = advised_mass_with(0.0);
@@ -384,9 +384,9 @@ class NewCell {
     return without;
   }
 
-  // Where none is stable or steady the arm's gears are too soft for the filter: a slower one is tried.
+  // If no mass is stable or steady, the arm's gears are too soft for the setpoint filter, so slower filters are tried.
   void advise_mass() {
-    std::string with_the_fastest;  // what went wrong with the filter that an arm should bear
+    std::string with_the_fastest;  // the error with the fastest filter
     for (const double bandwidth_Hz : {25.0, 15.0, 10.0}) {
       cell_.limits.setpoint_bandwidth_Hz = bandwidth_Hz;
       const auto mass_kg = advised_mass_and_damping();

@@ -17,17 +17,17 @@ using models::JointVector;
 using models::Vec3;
 
 constexpr int poses = 20000;
-constexpr std::size_t tried = 2000;  // of them, whether the hand's way can be gone
-// Of that way, per metre of reach up to one: less than what a call of the inverse kinematics may turn joints by.
+constexpr std::size_t tried = 2000;  // poses for which the hand's path is tried
+// Step along that path, per metre of reach up to one; shorter than one call of the inverse kinematics can follow.
 constexpr double step_share = 2e-3;
-// Nearer to an axis than this the tool is at it, where turning doesn't move it.
+// Closer to an axis than this the tool counts as on it: turning about the axis doesn't move the tool.
 constexpr double at_an_axis_m = 1e-3;
-// The least reach that steps are chosen for: on a smaller circle the hand's way would take thousands of them.
+// The least reach for which steps are chosen: with a smaller one the path would take thousands of steps.
 constexpr double smallest_circle_m = 0.05;
-constexpr double another_rad = 0.3;  // m of a joint that slides: half of the way of a hand
-constexpr double least_share = 0.4;  // of the start's smallest singular value, anywhere on the way
+constexpr double another_rad = 0.3;  // between two starts; for a joint that slides m, half of a hand's path
+constexpr double least_share = 0.4;  // required share of the start's smallest singular value, anywhere on the path
 
-// From 0 at an end of a joint's range to 1 in its middle; of the joint that is nearest to its end.
+// Distance of the joint nearest to its end: 0 at an end of its range, 1 in the middle.
 double room(const models::Arm& arm, const JointVector& q) {
   double least = 1.0;
   for (int i = 0; i < arm.axes(); ++i) {
@@ -37,8 +37,8 @@ double room(const models::Arm& arm, const JointVector& q) {
   return least;
 }
 
-// How far the tool comes from an axis that turns: of arms that only turn by their length when stretched; of others, in
-// whose bound the ways of all sliding joints are counted, over the poses. Of an arm that only slides, a metre.
+// Largest distance of the tool from a revolute axis (m): the stretched length; with prismatic joints the maximum over
+// the sampled poses. 1 m for an arm that only slides.
 double reach_of(const models::Arm& arm) {
   bool slides = false;
   for (int i = 0; i < arm.axes(); ++i) slides = slides || arm.slides(i);
@@ -54,7 +54,7 @@ double reach_of(const models::Arm& arm) {
   return reach_m > at_an_axis_m ? reach_m : 1.0;
 }
 
-// Takes full turns off joints whose ranges allow more than one.
+// Removes full turns from joints with a range of more than a turn.
 void turn_within_once(const models::Arm& arm, JointVector& q) {
   constexpr double once = 2.0 * std::numbers::pi;
   for (int i = 0; i < arm.axes(); ++i) {
@@ -64,8 +64,8 @@ void turn_within_once(const models::Arm& arm, JointVector& q) {
   }
 }
 
-// Turns an upright first joint so that the tool is straight ahead, where people take hold of an arm. A pose for which
-// the joint's range is too narrow stays as it is.
+// Turns an upright first joint so that the tool is straight ahead, where people take hold of an arm. If the joint's
+// range is too narrow, the pose is unchanged.
 void turn_ahead(const models::Arm& arm, JointVector& q) {
   constexpr double upright = 0.999;
   const auto first = static_cast<Eigen::Index>(arm.drive_along_chain(0));
@@ -82,8 +82,8 @@ void turn_ahead(const models::Arm& arm, JointVector& q) {
   }
 }
 
-// From 0 to 1: the smaller one of two shares. The first is that of σ of the place (place_margin.hpp) by a quarter of
-// the reach; the second, of a wrist, that of the sine of its middle angle by a half.
+// From 0 to 1, the smaller of two values: σ of the place (place_margin.hpp) over a quarter of the reach, and for a
+// wrist the sine of its middle angle over a half.
 double dexterity(const models::Arm& arm, const controller::PlaceMargin& places, const JointVector& q, double reach_m) {
   constexpr double well_share = 0.25, well_sine = 0.5;
   models::ToolKinematics at;
@@ -102,16 +102,16 @@ double smallest_singular_value(const models::InverseKinematics& inverse, const m
   return result.smallest_singular_value_m_per_rad;
 }
 
-// What the tool's place is judged from: the first joint. Heights are from the floor, where z of W is 0, as arms stand
-// on it, hang above it or are bolted to a pedestal; of one that is further from it than it reaches, from the joint,
-// too.
+// The point from which the tool's place is judged: the first joint, but at the height of the floor, z = 0 in W, because
+// arms stand on the floor, hang above it or are bolted to a pedestal. If the floor is out of the arm's reach, the joint
+// itself.
 Vec3 judged_from(const models::ArmPoints& points_W, double reach_m) {
   Vec3 from = points_W.joint_W[0];
   if (std::abs(from.z()) <= reach_m) from.z() = 0.0;
   return from;
 }
 
-// Each part is between 0 and its weight.
+// The higher, the better. Dexterity adds at most 2, each other term at most 1.
 double score(const models::Arm& arm, const controller::PlaceMargin& places, const JointVector& q, double reach_m) {
   const models::Pose X_WT = arm.tool_pose(q);
   models::ArmPoints points_W;
@@ -130,7 +130,8 @@ double score(const models::Arm& arm, const controller::PlaceMargin& places, cons
   return 2.0 * dexterity(arm, places, q, reach_m) + free + points + ahead - 4.0 * off - 4.0 * below;
 }
 
-// How far the arm comes on the hand's way: to its end (infinite), or so many metres of its first straight piece.
+// How far the arm follows the hand's path: infinite to its end, else the length that it follows on the first straight
+// piece.
 double gone_m(const models::Arm& arm, models::InverseKinematics inverse, const JointVector& start,
               const description::HandDescription& hand, double step_m) {
   inverse.set_posture(start);
@@ -160,7 +161,6 @@ double gone_m(const models::Arm& arm, models::InverseKinematics inverse, const J
   return std::numeric_limits<double>::infinity();
 }
 
-// The length of the first straight piece of a hand's way.
 double first_piece_m(const description::HandDescription& hand) {
   for (const description::Waypoint& waypoint : hand.waypoints) {
     const double length_m = Vec3(waypoint.offset_m.data()).norm();
@@ -169,14 +169,14 @@ double first_piece_m(const description::HandDescription& hand) {
   return 0.0;
 }
 
-// What was found of a pose: where the way can't be gone further on its first piece, a shorter way that goes beyond that
-// can't be gone either.
+// A pose and how far the path's first piece could be followed from it. A shorter path whose first piece is longer than
+// that can be skipped.
 struct Tried {
   JointVector q;
   double most_m = std::numeric_limits<double>::infinity();
 };
 
-// Poses all over the joints' ranges, the best first; straight ahead, or wherever the first joint has them.
+// Poses all over the joints' ranges, the best first; with `ahead`, the first joint is turned straight ahead.
 std::vector<Tried> sorted_poses(const models::Arm& arm, double reach_m, bool ahead) {
   struct Candidate {
     double score;
@@ -189,7 +189,7 @@ std::vector<Tried> sorted_poses(const models::Arm& arm, double reach_m, bool ahe
     JointVector q = models::spread_pose(arm, k);
     if (ahead) turn_ahead(arm, q);
     turn_within_once(arm, q);
-    for (int i = 0; i < arm.axes(); ++i) q[i] = std::round(1e4 * q[i]) / 1e4;  // as it is written
+    for (int i = 0; i < arm.axes(); ++i) q[i] = std::round(1e4 * q[i]) / 1e4;  // as the file has it
     candidates.push_back({score(arm, places, q, reach_m), q});
   }
   std::sort(candidates.begin(), candidates.end(),
@@ -209,7 +209,7 @@ std::vector<StartPose> find_starts(const models::Arm& arm, const description::Ha
     return std::all_of(found.begin(), found.end(),
                        [&](const StartPose& start) { return (start.q - q).cwiseAbs().maxCoeff() > another_rad; });
   };
-  // Straight ahead, and anywhere: made when they are first needed, and all the same where the first joint slides.
+  // Straight ahead, and with any first joint. Computed when first needed; one list suffices if the first joint slides.
   std::vector<std::vector<Tried>> sorted(arm.slides(arm.drive_along_chain(0)) ? 1 : 2);
   for (const double share : {1.0, 0.5, 0.25, 0.1}) {
     const description::HandDescription shorter = with_shorter_way(hand, share);
@@ -255,7 +255,7 @@ Vec3 outwards_in_sensor(const models::Arm& arm) {
   const Vec3 axis_W = (arm.slides(last) ? tool.J_W.col(last).head<3>() : tool.J_W.col(last).tail<3>()).normalized();
   models::ArmPoints points;
   arm.points(q, points);
-  // From the nearest joint before it that isn't on its axis.
+  // From the nearest earlier joint that isn't on this axis.
   double along = 0.0;
   for (int i = arm.axes() - 1; i >= 0 && std::abs(along) < 1e-3; --i) {
     along = axis_W.dot(tool.X_WS.translation() - points.joint_W[static_cast<std::size_t>(i)]);

@@ -1,4 +1,4 @@
-// Where an arm that nobody has placed yet begins: away from singularities and limits, with room for the hand.
+// Finds start poses for an arm: away from singularities and limits, with room for the hand's motion.
 #pragma once
 
 #include <vector>
@@ -11,24 +11,26 @@ namespace proxarm::command_line {
 
 struct StartPose {
   models::JointVector q;
-  double way = 0.0;  // the share of the hand's way that can be gone from there, without a joint's end or a singularity
+  double way = 0.0;  // share of the hand's path that the arm can follow from there without reaching a joint's end or a
+                     // singularity
 };
 
-// The same hand with a way of that share of its own.
+// Returns the hand with its path scaled by that share.
 description::HandDescription with_shorter_way(description::HandDescription hand, double share);
-// Of a tool that moves in a plane or on a line: ahead is along its first axis, and to the side along the second.
+// For a tool that moves in a plane or on a line: turns the path so that ahead is the space's first axis, and sideways
+// the second.
 description::HandDescription with_way_in(const models::ToolSpace& space, description::HandDescription hand);
 
-// The best of some thousand poses all over the joints' ranges. Good is: a place that can be moved well in all
-// directions (place_margin.hpp) with a wrist that is far from its singularity, all joints far from their ends, the tool
-// in front of the base at a height of a fifth to four fifths of the reach and pointing forwards or down, and the joints
-// above the floor. Of these it is the first one from which the hand's whole way can be gone, straight ahead of an
-// upright first joint, else wherever that joint has it; where there is none, half of it or less. Further ones follow,
-// up to `most`, each of which has a joint that is turned by 0.3 rad (or moved by 0.3 m) from all before.
+// Searches twenty thousand poses all over the joints' ranges. In a good pose the tool can move well in all directions
+// (place_margin.hpp), the wrist is far from its singularity, and all joints are far from their ends and above the
+// floor. The tool is in front of the base at a fifth to four fifths of the reach and points forwards or down. Returns
+// at most `most` poses, the best first, from which the arm can follow the hand's whole path, else half of it or less;
+// they differ by more than 0.3 rad (or 0.3 m) in some joint. An upright first joint is turned straight ahead if
+// possible. If a tenth of the path is too much everywhere, returns the best pose with way = 0.
 std::vector<StartPose> find_starts(const models::Arm& arm, const description::HandDescription& hand, std::size_t most);
 
-// The axis of the sensor that points out of the arm, in its link: that of the last joint that turns (of a last one that
-// slides, its own), away from the joints before it.
+// Returns the direction out of the arm, in the sensor's link: the axis of the last joint, away from the joints before
+// it.
 models::Vec3 outwards_in_sensor(const models::Arm& arm);
 
 }  // namespace proxarm::command_line

@@ -20,8 +20,8 @@ namespace {
 
 constexpr std::size_t most_joints = 1000;  // searches in the tree take the square of it, and recurse as deep
 
-// Attributes of links and joints, and of what stands in them, that are finite numbers where they stand. Of masses and
-// inertias those that aren't are estimated (link_inertia.hpp).
+// Attributes that must be finite numbers if present. Invalid masses and inertias are estimated instead
+// (link_inertia.hpp).
 struct Numbers {
   const char *element, *attribute;
   int count;
@@ -53,15 +53,15 @@ std::string text_of(const XMLElement* element, const char* name) {
 
 namespace {
 
-// The attribute xyz of the joint's <origin> or <axis>; without it, what the format says.
+// The attribute xyz of a joint's <origin> or <axis>; the format's default if it is missing.
 Vec3 vector_of(const XMLElement* element, const Vec3& otherwise) {
   std::istringstream in(text_of(element, "xyz"));
   double x = 0.0, y = 0.0, z = 0.0;
   return in >> x >> y >> z ? Vec3(x, y, z) : otherwise;
 }
 
-// With blanks in the place of processing instructions, so that lines stay what they are: tinyxml2 takes them at the
-// very beginning only, XML takes them anywhere, and they say nothing of an arm.
+// Replaces processing instructions by blanks, so that line numbers stay. XML permits them anywhere, tinyxml2 only at
+// the beginning.
 std::string without_instructions(std::string xml) {
   const auto end_of = [&](std::size_t from, const char* mark) {
     const std::size_t found = xml.find(mark, from);
@@ -110,7 +110,7 @@ SetupError UrdfTree::mistake(const XMLElement* where, std::string message) const
   return SetupError({.file = file_.string(), .line = where->GetLineNum(), .message = std::move(message)});
 }
 
-// tinyxml2 reads no file that is nested deeper than 500.
+// Recurses at most 500 deep, as tinyxml2 refuses files that are nested deeper.
 void UrdfTree::require_numbers(const XMLElement* element) const {
   for (const Numbers& one : numbers) {
     const char* text = std::strcmp(element->Name(), one.element) == 0 ? element->Attribute(one.attribute) : nullptr;
@@ -131,7 +131,7 @@ void UrdfTree::add_link(XMLElement* element) {
   if (!links_.emplace(name, element).second) throw mistake(element, "a second link named " + in_quotes(name));
 }
 
-// No link has two joints above it: what can be reached from the root is a tree, and every search in it ends.
+// No link has two joints above it, so all that the root reaches is a tree, and every search in it ends.
 void UrdfTree::add_joint(XMLElement* element) {
   require_numbers(element);
   UrdfTreeJoint joint{element,
@@ -223,12 +223,12 @@ std::string UrdfTree::found_tip() const {
       if (joints > most) way = joint;
       most = std::max(most, joints);
     }
-    // The end, or where fingers or a second arm begin. What an arm has beside itself (a balancer) is shorter.
+    // The end, or where fingers or a second arm begin. A side branch such as a balancer is shorter than the arm.
     if (way == nullptr || (second > 0 && most < second + 2)) break;
     at = way->child;
     if (way->moves()) last_moved = at;
   }
-  // The links that are fixed to the last one that moves and named for it, the best name first.
+  // Of the links fixed to the last moving one, takes the one with the best of these names.
   std::vector<std::string> fixed{last_moved};
   for (std::size_t k = 0; k < fixed.size(); ++k) {
     for (const UrdfTreeJoint* joint : below(fixed[k])) {

@@ -1,4 +1,4 @@
-// The links and joints of a URDF, whatever else stands in it: where the chain to the sensor goes.
+// The tree of links and joints in a URDF, to find the chain to the sensor.
 #pragma once
 
 #include <tinyxml2.h>
@@ -13,7 +13,7 @@
 
 namespace proxarm::command_line {
 
-// Empty where there is no such element or attribute.
+// Empty if the element or attribute is missing.
 std::string text_of(const tinyxml2::XMLElement* element, const char* name);
 
 struct UrdfTreeJoint {
@@ -23,14 +23,14 @@ struct UrdfTreeJoint {
   [[nodiscard]] bool moves() const { return !mimic && (turns() || type == "prismatic"); }
   [[nodiscard]] bool turns() const { return type == "revolute" || type == "continuous"; }
   [[nodiscard]] models::Vec3 origin() const;  // in the parent's link
-  [[nodiscard]] models::Vec3 axis() const;    // as it is written
+  [[nodiscard]] models::Vec3 axis() const;    // not normalized
 };
 
 class UrdfTree {
  public:
   using Path = std::vector<const UrdfTreeJoint*>;
 
-  // `file` is for messages. Throws SetupError, with its line.
+  // `file` is for messages. Throws SetupError with the file's line.
   UrdfTree(const std::filesystem::path& file, const std::string& xml);
 
   [[nodiscard]] tinyxml2::XMLElement* robot() const { return robot_; }
@@ -39,10 +39,10 @@ class UrdfTree {
   [[nodiscard]] const std::map<std::string, tinyxml2::XMLElement*>& links() const { return links_; }
   [[nodiscard]] const std::string& root() const { return root_; }
 
-  // From the root to that link. Throws where there is no such link.
+  // The joints from the root to that link. Throws if there is no such link.
   [[nodiscard]] Path path_to(const std::string& link) const;
-  // The link to put the sensor on, where none was named: at the end of the joints that move, or where they branch, and
-  // there the one that is called for it.
+  // The link for the sensor if the user named none: where the moving joints end or branch, and among the links fixed
+  // there the one with a usual name.
   [[nodiscard]] std::string found_tip() const;
 
  private:
@@ -51,8 +51,8 @@ class UrdfTree {
   void add_joint(tinyxml2::XMLElement* element);
   void find_root();
   [[nodiscard]] Path below(const std::string& link) const;
-  // How many joints move one after the other from this one on, itself included, at most; mimic ones (a gripper's second
-  // finger) among them.
+  // The largest number of moving joints in a row from this one on, itself included; mimic joints (a gripper's second
+  // finger) count.
   [[nodiscard]] int motion_beyond(const UrdfTreeJoint& joint) const;
   [[nodiscard]] description::SetupError mistake(const tinyxml2::XMLElement* where, std::string message) const;
 

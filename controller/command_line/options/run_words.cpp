@@ -118,7 +118,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
 
 namespace {
 
-// The program's own command, of which nothing but the options counts.
+// The options, and a command that parses nothing else.
 struct Table {
   RunOptions options;
   CLI::App app{"", "run"};
@@ -131,7 +131,7 @@ struct Table {
 RunOptions run_options(const std::vector<std::string>& words) {
   Table table;
   try {
-    table.app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // it takes them from the end
+    table.app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // CLI11 takes them from the end
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {
       throw description::SetupError(

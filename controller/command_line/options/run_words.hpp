@@ -1,5 +1,5 @@
-// The one table of what `proxarm run` takes: for the program, and for programs of one's own (controller/library), which
-// have the same words without a command line.
+// The one table of the options of `proxarm run`: for the program, and for the library (controller/library), which
+// parses the same words without a command line.
 #pragma once
 
 #include <optional>
@@ -14,14 +14,14 @@ class App;
 
 namespace proxarm::command_line {
 
-// All of them. `app` and `options` must outlive the parsing.
+// Adds all options. Precondition: `app` and `options` outlive the parsing.
 void add_run_options(CLI::App& app, RunOptions& options);
 
-// What these words ask for, such as {"--mass=4kg", "--no-plot"}. Throws SetupError with the words of the program.
+// Parses words such as {"--mass=4kg", "--no-plot"}. Throws SetupError with the program's message.
 RunOptions run_options(const std::vector<std::string>& words);
 
-// What an option takes, as its help names it: "TIME", "auto|off|TIME"; empty: it is a flag. `name` is "--mass" or, of
-// the file without one, "cell". Nothing: there is no such option.
+// Returns the value's type as in the help: "TIME", "auto|off|TIME"; empty for a flag; nothing for an unknown option.
+// `name` is "--mass", or "cell" for the positional argument.
 std::optional<std::string> run_option_type(const std::string& name);
 
 }  // namespace proxarm::command_line

@@ -1,4 +1,4 @@
-// Options that several commands share. Each function adds some to `app`; `options` must outlive the parsing.
+// Options that several commands share; each function adds some to `app`. Precondition: `options` outlives the parsing.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -21,7 +21,7 @@ void add_without_enabling(CLI::App& app, RunOptions& options);
 void add_hardware_option(CLI::App& app, RunOptions& options);
 void add_view_options(CLI::App& app, RunOptions& options, const char* what);
 
-// What has no effect on a command isn't offered by it.
+// A command doesn't offer options that have no effect on it.
 void leave_out(CLI::App& app, std::initializer_list<const char*> options);
 
 }  // namespace proxarm::command_line

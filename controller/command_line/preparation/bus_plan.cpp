@@ -25,7 +25,7 @@ using fieldbus::PlannedFrame;
 
 std::int64_t period_ns(const PreparedSession& session) { return std::llround(session.settings.period_s * 1e9); }
 
-// A frame that comes every `ms` milliseconds, in cycles.
+// The period, in cycles, of a frame that comes every `ms` milliseconds.
 int cycles_of(const PreparedSession& session, int ms) {
   return std::max(1, static_cast<int>(std::int64_t{ms} * 1'000'000 / period_ns(session)));
 }
@@ -38,7 +38,7 @@ void add_sync(PlannedBus& bus) {
   bus.frames.push_back(sync);
 }
 
-// Queued after all setpoints.
+// The heartbeat is queued after all setpoints.
 void add_heartbeat(PlannedBus& bus, const PreparedSession& session) {
   fieldbus::DriveSettings drive;
   drive.stop_without_controller(session.cell.supervision.bus_loss_stop_s);
@@ -51,7 +51,7 @@ void add_heartbeat(PlannedBus& bus, const PreparedSession& session) {
   bus.frames.push_back(heartbeat);
 }
 
-// Life guarding: a request without data and its answer, as often as the heartbeat and behind it.
+// Life guarding: a request without data and its answer, as often as the heartbeat and sent after it.
 void add_guarding(PlannedBus& bus, const PlannedFrame& heartbeat, const description::DriveDescription& drive) {
   if (drive.bring_up.stops_by != description::StopsBy::life_guarding) return;
   PlannedFrame frame = heartbeat;
@@ -66,10 +66,11 @@ void add_guarding(PlannedBus& bus, const PlannedFrame& heartbeat, const descript
   bus.frames.push_back(frame);
 }
 
-// What frames usually hold: drives enabled and within 0.2 rad of the start pose, a hand that pushes with 10 N and 1 Nm.
+// Typical contents of frames: drives enabled and within 0.2 rad of the start pose, a hand that pushes with 10 N and 1
+// Nm.
 constexpr int typical_samples = 256;
 constexpr double typical_motion_rad = 0.2, typical_force_N = 10.0, typical_torque_Nm = 1.0;
-// A polled sensor's, from the request to its answer; what the simulated ones take. Makers don't state it.
+// From a poll to the sensor's answer, as simulated sensors take it. Makers don't state this time.
 constexpr std::int64_t answer_time_ns = sim::DescribedDeviceConfig{}.answer_time_ns;
 constexpr std::uint16_t typical_controlword = 0x000F, typical_statusword = 0x1237;
 
@@ -99,7 +100,7 @@ class TypicalPdos {
     if (mapped.object == fieldbus::object_address(drive_.objects.controlword)) return typical_controlword;
     if (mapped.object == fieldbus::object_address(drive_.objects.statusword)) return typical_statusword;
     if (mapped.bits == 16) return static_cast<std::uint32_t>(std::lround(100.0 * around_(random_)));  // a torque
-    // Some joints move far, others hardly: all orders of magnitude down to a count.
+    // Some joints move far, others hardly, so the motions have all orders of magnitude down to a count.
     const double reach_rad = typical_motion_rad * std::pow(10.0, -7.0 * std::abs(around_(random_)));
     return static_cast<std::uint32_t>(scale_.counts(start_rad_ + reach_rad * around_(random_)).value_or(0));
   }
@@ -111,7 +112,7 @@ class TypicalPdos {
   std::uniform_real_distribution<double> around_{-1.0, 1.0};
 };
 
-// The frames of its samples under a push.
+// The frames of a described sensor's samples under a push.
 class TypicalSensor final : private sim::WrenchSource, private sim::DevicePort {
  public:
   std::vector<fieldbus::CanFrame> operator()(const description::SensorDescription& sensor, std::uint32_t base_id) {
@@ -165,7 +166,7 @@ void add_drive(PlannedBus& bus, const PreparedSession& session, std::size_t axis
   for (const PlannedFrame& frame : {feedback, target}) bus.frames.push_back(frame);
 }
 
-// Gauges first, first + 2, first + 4 at `at` of the frame, with what a push and the converter's noise make of them.
+// The frame's last six bytes hold gauges first, first + 2 and first + 4: the bias plus a random push and noise.
 std::vector<fieldbus::CanFrame> typical_gauges(const PreparedSession& session, PlannedFrame frame, std::size_t first) {
   std::mt19937 random(1);
   std::uniform_int_distribution<int> around(-500, 500);
@@ -184,7 +185,7 @@ std::vector<fieldbus::CanFrame> typical_gauges(const PreparedSession& session, P
   return frames;
 }
 
-// In TPDO2 of its drive, or a message that comes at least twice before it is too old.
+// The enabling input is in TPDO2 of its drive, or in a message that comes at least twice before it is too old.
 void add_enabling_input(PlannedBus& bus, const PreparedSession& session) {
   const description::EnablingInputDescription& input = *session.cell.enabling_input;
   PlannedFrame frame{.name = "enabling input", .id = input.identifier};
@@ -203,7 +204,7 @@ void add_enabling_input(PlannedBus& bus, const PreparedSession& session) {
     frame.any_time = true;
     frame.every_cycles = cycles_of(session, std::max(1, static_cast<int>(500.0 * input.timeout_s)));
   }
-  // Pressed, and nothing else in it.
+  // Typical content: pressed, all other bits 0.
   fieldbus::CanFrame usual;
   usual.id = frame.id;
   usual.extended = frame.shape.extended;
@@ -214,7 +215,7 @@ void add_enabling_input(PlannedBus& bus, const PreparedSession& session) {
   bus.frames.push_back(frame);
 }
 
-// ATI Net CAN OEM: a poll, and two answers.
+// ATI Net CAN OEM: a poll and two answers.
 void add_sensor(PlannedBus& bus, const PreparedSession& session) {
   const std::uint32_t base = session.cell.sensor.base_id << 4;
   PlannedFrame poll{.name = "sensor poll", .id = base};
@@ -247,8 +248,8 @@ PlannedFrame described_frame(const description::SensorProtocol& protocol, std::u
   return frame;
 }
 
-// A polled sensor answers within the receive window. One that streams has a clock of its own, whatever the timestep is,
-// and a sample's frames follow one another.
+// A polled sensor answers within the receive window. A streaming sensor has its own clock, independent of the timestep.
+// The frames of a sample follow one another.
 void add_described_sensor(PlannedBus& bus, const PreparedSession& session) {
   const description::SensorProtocol& protocol = *session.sensor.described;
   const std::uint32_t base_id = session.cell.sensor.base_id;
@@ -284,7 +285,7 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
     if (indices[i] != index) continue;
     const description::BusDescription& own = session.cell.buses[i];
     bus.name += (bus.name.empty() ? "" : "+") + own.name;
-    // What shares an interface has the slowest of its rates; a classic bus among them makes all of it classic.
+    // Buses that share an interface take the slowest of their rates; one classic bus makes the interface classic.
     bus.data_bitrate = bus.bitrate == 0 ? own.data_bitrate : std::min(bus.data_bitrate, own.data_bitrate);
     bus.bitrate = bus.bitrate == 0 ? own.bitrate : std::min(bus.bitrate, own.bitrate);
     const auto on_it = [&](const description::DriveDescription& d) { return d.bus == own.name; };
@@ -319,9 +320,9 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
   return bus;
 }
 
-// ---- What of the cell would let a late sensor come in time
+// ---- Keys of the cell that would let a late sensor arrive in time
 
-// One of the network's buses in a session as it is or might be.
+// Plans one bus of the network, for a given session or for a variant of it.
 class PlaceOfBus {
  public:
   PlaceOfBus(const controller::BusIndices& indices, std::size_t index) : indices_(indices), index_(index) {}
@@ -349,9 +350,10 @@ class PlaceOfBus {
   std::size_t index_;
 };
 
-// The nearest base_id below the sensor's that is free and with which all fits; nullopt: none, or the sensor has none.
+// Returns the nearest free base_id below the sensor's with which all frames fit; nullopt if there is none, or if the
+// sensor has no base id.
 std::optional<std::uint32_t> lower_base_id(PreparedSession session, const PlaceOfBus& place) {
-  constexpr std::uint32_t tries = 128;  // all that an ATI sensor can have
+  constexpr std::uint32_t tries = 128;  // an ATI sensor has no more base ids
   if (session.sensor.described && !session.sensor.described->has_base_id) return std::nullopt;
   const std::uint32_t least = session.sensor.described ? session.sensor.described->base_id_min : 0;
   std::uint32_t& base_id = session.cell.sensor.base_id;
@@ -362,7 +364,7 @@ std::optional<std::uint32_t> lower_base_id(PreparedSession session, const PlaceO
   return std::nullopt;
 }
 
-// The shortest receive_window above the cell's with which all fits, in twentieths of the timestep.
+// Returns the shortest receive_window above the session's with which all frames fit, in twentieths of the timestep.
 std::optional<double> longer_window(PreparedSession session, const PlaceOfBus& place) {
   constexpr int steps = 20, longest = 16;  // the key's range ends at 0.8
   for (int n = 1; n <= longest; ++n) {
@@ -374,7 +376,7 @@ std::optional<double> longer_window(PreparedSession session, const PlaceOfBus& p
   return std::nullopt;
 }
 
-// Where all would fit into the cycle, but comes too late.
+// Adds these two remedies if the frames fit into the cycle but arrive too late.
 void add_ways_of_the_cell(const PreparedSession& session, const PlaceOfBus& place, fieldbus::BusPlan& plan) {
   if (plan.fits || plan.worst_ns > plan.period_ns || !place.has_sensor(session.cell)) return;
   std::vector<std::string> ways;

@@ -11,20 +11,20 @@
 
 namespace proxarm::command_line {
 
-// One plan per bus of the network: buses of the cell that share an interface are one logical bus, with the lowest
-// bitrate among them. `indices[i]` is where the cell's bus i is.
+// Returns one plan per bus of the network. Buses of the cell that share an interface are one bus, with the lowest
+// bitrate among them. `indices[i]` is the network's bus for the cell's bus i.
 std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const controller::BusIndices& indices);
 
-// Throws SetupError with the arithmetic where a bus of the cell can't carry the timestep: in simulation each on a wire
-// of its own, else on the interfaces of options.bus. It names who asked for that: the options or the cell.
+// Throws SetupError with the arithmetic if a bus of the cell can't carry the timestep. In simulation each bus has its
+// own wire; otherwise options.bus names the interfaces. The error names what set the timestep: an option or the cell.
 void require_carried(const PreparedSession& session, const RunOptions& options);
-// Whether that would be refused.
+// Returns whether each bus of the cell, on its own wire, can carry the timestep.
 [[nodiscard]] bool is_carried(const PreparedSession& session);
 
 using IsVirtual = std::function<bool(const std::string& interface)>;
 bool is_virtual_interface(const std::string& interface);
-// The same for buses on these interfaces, one for each of the cell's: two on one interface share its wire. Virtual ones
-// have no bit timing, so of them it is a warning on standard error.
+// Checks buses on these interfaces, one interface for each bus of the cell; buses on one interface share its wire.
+// Virtual interfaces have no bit timing, so for them it only warns on standard error.
 void require_carried_on(const std::vector<std::string>& interfaces, const PreparedSession& session,
                         const RunOptions& options, const IsVirtual& is_virtual = is_virtual_interface);
 

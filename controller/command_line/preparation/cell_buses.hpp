@@ -1,4 +1,4 @@
-// The buses of a cell, as the networks want them.
+// Converts the buses of a cell to what the networks take.
 #pragma once
 
 #include <string>
@@ -12,13 +12,13 @@ namespace proxarm::command_line {
 
 std::vector<std::string> bus_names(const description::Cell& cell);
 
-// For a network that has the cell's buses in the cell's order.
+// For a network that has the cell's buses in the same order.
 controller::BusIndices buses_in_order(const description::Cell& cell);
 
-// For one that is on these interfaces, one for each of the cell's buses: two on one interface share its wire.
+// For a network on these interfaces, one for each bus of the cell. Buses on one interface share its wire.
 controller::BusIndices indices_of(const std::vector<std::string>& interfaces);
 
-// Throws SetupError where a bus with a data bitrate is to be on an interface that is set up for classic CAN.
+// Throws SetupError if a bus with a data bitrate is on an interface that is set up for classic CAN.
 void require_fd(const description::Cell& cell, fieldbus::SocketCanNetwork& network);
 
 }  // namespace proxarm::command_line

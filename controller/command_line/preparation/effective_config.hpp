@@ -1,4 +1,4 @@
-// The configuration that a session ran with, every default filled in, as text for its record.
+// Writes the configuration of a session, with every default filled in, as text for its record.
 #pragma once
 
 #include <string>

@@ -58,7 +58,6 @@ const char* name_of(FileKind kind) {
   return "a file of another kind";
 }
 
-// How a file of that kind is given.
 const char* advice_for(FileKind kind) {
   switch (kind) {
     case FileKind::cell:
@@ -90,7 +89,7 @@ FileKind kind_of(const fs::path& file) {
   if (!fs::is_regular_file(file, ignored)) return FileKind::unknown;
   try {
     return kind_of_yaml(description::YamlNode::load(file));
-  } catch (const description::SetupError&) {  // whoever wants its content says what is wrong, and where
+  } catch (const description::SetupError&) {  // the file's loader reports the error with its line
   }
   return FileKind::unknown;
 }

@@ -12,7 +12,7 @@
 namespace proxarm::command_line {
 namespace {
 
-// A target waits for the next exchange, half of one on average, and is reached one exchange later.
+// A setpoint waits for the next exchange, half an exchange on average, and is reached one exchange later.
 constexpr double exchanges_late = 1.5;
 
 void warn_if_unstable(const PreparedSession& session, const std::string& joint, double rate_Hz) {
@@ -57,7 +57,7 @@ std::vector<DriveOnLine> drives_on(const description::Cell& cell, const descript
   return drives;
 }
 
-// Drives and the sensor, of which each has its turn.
+// The number of drives on the line, plus the sensor. They take turns.
 int devices_on(const description::Cell& cell, const description::ModbusLineDescription& line) {
   return static_cast<int>(drives_on(cell, line).size()) + (cell.sensor.bus == line.name ? 1 : 0);
 }

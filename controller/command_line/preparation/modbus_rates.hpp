@@ -1,4 +1,4 @@
-// What Modbus lines achieve, shown before the motion, and whether a hand can be coupled through an axis that slow.
+// Reports the rates of Modbus lines before the motion, and whether a hand can be coupled through such slow axes.
 #pragma once
 
 #include <string>
@@ -8,15 +8,15 @@
 
 namespace proxarm::command_line {
 
-// On standard error, a line per drive on Modbus with its measured rate, and a warning with the arithmetic where the
-// loop with the hand, judged as if all of the motion went through that axis, has no margin at the mass that is wanted.
+// Prints the measured rate of each drive on Modbus on standard error. Also prints a warning with the arithmetic if the
+// loop with the hand isn't stable at the wanted mass, judged as if all motion went through that axis.
 void report_modbus_rates(const PreparedSession& session, const controller::CycleParts& parts);
 
-// The rate at which the joint that reports its position most seldom can be expected to, 1/s; 0: none is on Modbus.
+// The expected rate of the joint that reports its position least often, 1/s; 0: no drive is on Modbus.
 double slowest_report_Hz(const description::Cell& cell);
 
-// What can be expected of the cell's Modbus lines before anything is asked: a few lines each, with the arithmetic of
-// serial ones. The same warning on standard error.
+// Returns the expected rates of the cell's Modbus lines: a few lines of text each, with the arithmetic for serial
+// lines. Prints the same warning on standard error. Asks no device.
 std::string modbus_plan_text(const PreparedSession& session);
 
 }  // namespace proxarm::command_line

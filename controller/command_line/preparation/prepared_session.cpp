@@ -38,8 +38,8 @@ fs::path beside(const fs::path& file, const std::string& relative) {
   return (file.parent_path() / relative).lexically_normal();
 }
 
-// Loads a file that the user may have named. One of another kind is told by its kind, not by the first key that is
-// strange to the loader.
+// Loads a file that the user may have named. If it is of another kind, the error says so, instead of naming the first
+// key that the loader doesn't know.
 template <typename Load>
 auto loaded(const fs::path& file, FileKind kind, const Load& load) {
   try {
@@ -50,7 +50,7 @@ auto loaded(const fs::path& file, FileKind kind, const Load& load) {
   }
 }
 
-// A missing file is told with its option: a number in its place is a common slip.
+// Reports a missing file with its option, because giving a number instead of a file is a common slip.
 void require_file(const fs::path& given, const char* option, const char* example) {
   std::error_code ignored;
   if (given.empty() || fs::exists(user_file(given), ignored)) return;
@@ -59,7 +59,7 @@ void require_file(const fs::path& given, const char* option, const char* example
                                  .expected = std::string("a file, such as ") + example});
 }
 
-// The file that was named on the command line, or the cell's own (of which KEY tells in its file), or that one.
+// Returns the file named on the command line, else the cell's own file (named by KEY), else the shipped file `without`.
 fs::path chosen(const fs::path& given, const description::Cell& cell, const char* key, const std::string& cells_own,
                 const char* without) {
   if (!given.empty()) return user_file(given);
@@ -69,7 +69,7 @@ fs::path chosen(const fs::path& given, const description::Cell& cell, const char
   return file;
 }
 
-// Mean age of a sample: its converter holds it for half a period, its filter delays by its time constant.
+// Mean age of a sample (s): the converter holds it for half a period, and the filter adds its time constant.
 double sensor_delay_s(const description::SensorPlacement& sensor) {
   double delay_s = sensor.delay_s;
   if (sensor.sample_rate_Hz > 0.0) delay_s += 0.5 / sensor.sample_rate_Hz;
@@ -77,13 +77,13 @@ double sensor_delay_s(const description::SensorPlacement& sensor) {
   return delay_s;
 }
 
-// Of ElasticSetpoint's critically damped filter: 2/ω.
+// Delay of ElasticSetpoint's critically damped filter, 2/ω (s).
 double setpoint_filter_delay_s(const description::Cell& cell) {
   return cell.limits.setpoint_bandwidth_Hz > 0.0 ? 2.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz) : 0.0;
 }
 
-// A simulated sensor without noise repeats itself, a real one never does; and one that is slower than the cycle is read
-// several times per sample. 0: repetitions aren't counted.
+// Returns how many equal readings in a row are allowed. A real sensor never repeats itself, a simulated one without
+// noise does. A sensor slower than the cycle is read several times per sample. 0: repetitions aren't counted.
 std::uint32_t repeats_allowed(const description::SensorPlacement& sensor, bool real, std::uint32_t samples,
                               double period_s) {
   if (!real && !(sensor.noise_N > 0.0)) return 0;
@@ -91,7 +91,7 @@ std::uint32_t repeats_allowed(const description::SensorPlacement& sensor, bool r
   return samples * static_cast<std::uint32_t>(std::ceil(std::clamp(reads, 1.0, 1000.0)));
 }
 
-// A sensor that sends less often than the cycle runs is missed only when several of its samples are.
+// A sensor that sends less often than the cycle runs counts as missed only after several of its own periods.
 std::uint32_t missed_samples_allowed(const description::SensorDescription& sensor, std::uint32_t samples,
                                      double period_s) {
   if (!sensor.described || !sensor.described->streams()) return samples;
@@ -99,12 +99,12 @@ std::uint32_t missed_samples_allowed(const description::SensorDescription& senso
   return samples * static_cast<std::uint32_t>(std::ceil(std::clamp(cycles, 1.0, 1000.0)));
 }
 
-// What a stream adds: nothing puts it in step with the cycle.
+// Mean delay of a streaming sensor (s), which isn't synchronous with the cycle.
 double stream_delay_s(const description::SensorDescription& sensor) {
   return sensor.described && sensor.described->streams() ? 0.5 / sensor.described->rate_Hz : 0.0;
 }
 
-// Below, no machine's cycle can be; above, no hand would call it touch. What a drive can hold exactly is in between.
+// Below, no computer keeps the cycle; above, a contact no longer feels like touch.
 constexpr double shortest_period_s = 50e-6, longest_period_s = 0.1;
 
 void require_period(const PreparedSession& session, const RunOptions& options) {
@@ -126,7 +126,7 @@ void require_period(const PreparedSession& session, const RunOptions& options) {
   }
 }
 
-// T, and what is counted in cycles of it.
+// Sets T and all settings that are counted in cycles of T.
 void set_timestep(PreparedSession& session, const RunOptions& options, double period_s) {
   controller::SessionSettings& settings = session.settings;
   settings.period_s = session.loop.period_s = period_s;
@@ -136,15 +136,15 @@ void set_timestep(PreparedSession& session, const RunOptions& options, double pe
   require_period(session, options);
 }
 
-// A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop. A torque
-// acts for a period.
+// A setpoint is reached one period after it is latched, in addition to the period of any sampled loop. A torque is held
+// for a period, which delays it by half a period.
 double loop_delay_s(const PreparedSession& session) {
   if (session.impedance()) return 0.5 * session.settings.period_s;
   return session.settings.period_s + sensor_delay_s(session.cell.sensor) + stream_delay_s(session.sensor) +
          setpoint_filter_delay_s(session.cell);
 }
 
-// The impedance type renders at the point with the device's own mass: what only a proxy has can't be asked for.
+// The impedance type renders at the point with the device's own mass, so options of a proxy are refused.
 void choose_scheme(PreparedSession& session, const RunOptions& options) {
   using controller::Scheme;
   controller::SessionSettings& settings = session.settings;
@@ -176,7 +176,7 @@ void choose_scheme(PreparedSession& session, const RunOptions& options) {
   settings.mass_kg = 0.0;
 }
 
-// Held is J → ∞: an inertia, a damping or a spring of turning has no meaning beside it.
+// Held means J → ∞, so inertia, damping and spring of turning have no meaning.
 void choose_orientation(PreparedSession& session, const RunOptions& options) {
   using controller::OrientationMode;
   controller::SessionSettings& settings = session.settings;
@@ -190,7 +190,7 @@ void choose_orientation(PreparedSession& session, const RunOptions& options) {
         {.key = turns, .found = "--orientation held", .expected = "--orientation free, or none of the two"});
   }
   settings.rotational_inertia_kg_m2 = options.inertia_kg_m2.value_or(settings.rotational_inertia_kg_m2);
-  // As with a mass, nothing is felt beside an inertia that was asked for.
+  // A requested inertia is felt without the default damping, as a requested mass is.
   if (options.inertia_kg_m2) settings.rotational_damping_Nms_per_rad = 0.0;
   settings.rotational_damping_Nms_per_rad =
       options.turning_damping_Nms_per_rad.value_or(settings.rotational_damping_Nms_per_rad);
@@ -198,7 +198,7 @@ void choose_orientation(PreparedSession& session, const RunOptions& options) {
       options.turning_spring_Nm_per_rad.value_or(settings.rotational_spring_Nm_per_rad);
 }
 
-// The tool that was named on the command line, the scene's, or the cell's.
+// Takes the tool named on the command line, else the scene's, else the cell's.
 void choose_tool(PreparedSession& session, const RunOptions& options) {
   const std::string& of_cell = session.cell.tool.shape;
   if (options.tool == "point") {
@@ -210,7 +210,6 @@ void choose_tool(PreparedSession& session, const RunOptions& options) {
   }
 }
 
-// What a rigid tool can't be rendered with, and why.
 void require_renderable_tool(PreparedSession& session) {
   if (!session.scene.tool) return;
   const auto refuse = [&](const char* key, const std::string& found, const char* expected) {
@@ -230,7 +229,7 @@ void require_renderable_tool(PreparedSession& session) {
   session.rigid = scenes::compile_rigid(session.scene, session.scene.tool->shape);
 }
 
-// A wall's K and B must be stable on the device alone, in its lightest and in its heaviest direction.
+// A wall's K and B must be stable on the device without a hand, in its lightest and in its heaviest direction.
 void require_stable_coupling(const PreparedSession& session) {
   const controller::SessionSettings& settings = session.settings;
   const models::Arm arm(session.cell);
@@ -271,7 +270,7 @@ void choose_passivity(PreparedSession& session, const RunOptions& options) {
                               : cells == "auto"    ? Passivity::automatic
                               : cells == "observe" ? Passivity::observe
                                                    : Passivity::off;
-  // The impedance type has nothing to observe, so that a cell which doesn't insist suits it.
+  // The impedance type has nothing to observe, so for it only `on` is a contradiction.
   const bool nothing_to_see = session.impedance() && otherwise != Passivity::on;
   session.settings.passivity = options.passivity.value_or(nothing_to_see ? Passivity::off : otherwise);
   if (!session.impedance() || session.settings.passivity == Passivity::off) return;
@@ -287,7 +286,7 @@ void choose_passivity(PreparedSession& session, const RunOptions& options) {
                                  .expected = "off: its tool isn't sent anywhere, and follows the hand without delay"});
 }
 
-// What the profile asks for is in the cell's file; what an option could take away again isn't left out.
+// The loader has checked that the cell fulfils its profile. An option must not undo that.
 void require_profile(const PreparedSession& session) {
   if (session.cell.profile != description::Profile::hand_guiding) return;
   if (!session.settings.without_enabling_input) return;
@@ -306,7 +305,7 @@ std::shared_ptr<const std::vector<controller::ElasticArm>> arms_at(const Prepare
   return arms;
 }
 
-// "20 kN/m"; a scene's numbers are round.
+// For example "20 kN/m": scenes have round numbers.
 std::string stiffness_text(double N_per_m) {
   std::array<char, 40> text{};
   const bool kilo = N_per_m >= 1000.0;
@@ -314,7 +313,7 @@ std::string stiffness_text(double N_per_m) {
   return text.data();
 }
 
-// "layer 'foam' of 20 kN/m and layer 'mat' of 4 kN/m at once"
+// For example "layer 'foam' of 20 kN/m and layer 'mat' of 4 kN/m at once".
 std::string words_of(const scenes::LayersTogether& layers) {
   std::string words;
   for (const scenes::PressedLayer& layer : layers) {
@@ -324,7 +323,7 @@ std::string words_of(const scenes::LayersTogether& layers) {
   return words + (layers.size() > 1 ? " at once" : "");
 }
 
-// Each slides, and a single one with friction sticks, too.
+// The hand slides on each combination of layers; on a single layer with friction it may also stick.
 std::shared_ptr<const std::vector<controller::LayerTouch>> layers_of(const scenes::Scene& scene) {
   auto all = std::make_shared<std::vector<controller::LayerTouch>>();
   for (const scenes::LayersTogether& layers : scenes::layer_touches(scene)) {
@@ -354,10 +353,10 @@ double felt_inertia_kg_m2(const PreparedSession& session) {
 controller::LoopModel turning_loop(const PreparedSession& session) {
   const models::Arm arm(session.cell);
   controller::LoopModel loop = session.loop;
-  loop.horizon_s = 0.0;  // only the tool's place is predicted
+  loop.horizon_s = 0.0;  // only the translation is predicted
   loop.order = 1;
-  loop.layers = nullptr;  // the place is held
-  // With a place that is held, feed-forward would ask for a quarter more than it takes: PoseLoop judges it.
+  loop.layers = nullptr;  // the tool's place is held
+  // With the place held, feed-forward would seem to need a quarter more inertia than it does; PoseLoop judges it.
   loop.either_drive = false;
   loop.handle_mass_kg = models::tool_inertia(session.cell.tool).largest_kg_m2;
   loop.damping_Ns_per_m = session.settings.rotational_damping_Nms_per_rad;
@@ -368,15 +367,15 @@ controller::LoopModel turning_loop(const PreparedSession& session) {
 }
 
 namespace {
-// By its hand. One that doesn't twist the handle closes no loop: the proxy's own pole at 1 would be taken for an
-// unstable one.
+// Whether the hand turns the tool. If the hand doesn't twist the handle there is no loop, and the proxy's own pole at 1
+// would count as unstable.
 bool is_turned(const PreparedSession& session) {
   return !session.impedance() && session.settings.orientation != controller::OrientationMode::held &&
          session.cell.drives.size() >= 6 && session.hand.twists();
 }
 
-// A tool with a shape is taken to touch where it ends in the directions of a cube's faces and corners, a point in
-// itself.
+// The points at which contact is assumed. A tool with a shape touches with its extreme points in the directions of a
+// cube's faces and corners; a point tool touches at T.
 std::vector<controller::TouchedPlace> touched_places_T(const PreparedSession& session) {
   std::vector<controller::TouchedPlace> places;
   const bool is_point = !session.scene.tool;
@@ -384,7 +383,7 @@ std::vector<controller::TouchedPlace> touched_places_T(const PreparedSession& se
     const int x = i % 3 - 1, y = i / 3 % 3 - 1, z = i / 9 - 1;
     const models::Vec3 way(x, y, z);
     if (way.squaredNorm() != 1.0 && way.squaredNorm() != 3.0) continue;
-    if (is_point && i > 13) continue;  // the opposite ways, which are held likewise
+    if (is_point && i > 13) continue;  // the opposite directions give the same constraint
     const models::Vec3 n_T = way.normalized();
     const models::Vec3 r_T = is_point ? models::Vec3::Zero() : models::furthest_of(session.scene.tool->shape, n_T);
     places.push_back({r_T, n_T});
@@ -427,9 +426,10 @@ description::SetupProblem timestep_problem(const description::Cell& cell, const 
           .key = "default_period_s"};
 }
 
-// A hand without stiffness, such as one that exerts a recorded force, leaves the tool where it is. That drift is an
-// eigenvalue of exactly 1 at any mass, and isn't what is asked about: with the loosest grip it decays. It moves a
-// kilogram with a period of six seconds, far below all that oscillates, and D > K L at any delay L below a second.
+// The loosest grip that is judged. A hand without stiffness, such as one that plays a recorded force, lets the tool
+// drift: an eigenvalue of exactly 1 at any mass, which isn't an instability. With this grip the drift decays. A
+// kilogram then has a period of six seconds, far slower than any oscillation of interest, and D > K L for any delay L
+// below a second.
 constexpr double loosest_N_per_m = 1.0, loosest_Ns_per_m = 1.0;
 
 namespace {
@@ -438,7 +438,8 @@ controller::HandModel held_with(const description::Grip& grip, double mass_kg) {
   return {loosest_N_per_m, std::max(grip.damping_Ns_per_m, loosest_Ns_per_m), mass_kg};
 }
 
-// Each once, as stiff as it varies to. One that neither holds nor damps has let go.
+// Returns each other grip once, at its largest stiffness. A grip without stiffness and damping has let go and is left
+// out.
 std::vector<description::Grip> other_grips(const description::HandDescription& hand,
                                            const description::Grip& tightest) {
   std::vector<description::Grip> all{{0.0, hand.stiffness_N_per_m, hand.damping_Ns_per_m}}, others;
@@ -456,7 +457,7 @@ std::vector<description::Grip> other_grips(const description::HandDescription& h
 }
 }  // namespace
 
-// A grip that is stable with what the others ask for isn't searched.
+// The smallest stable mass is computed for a grip only if the smallest mass found so far is unstable with it.
 controller::HandModel hand_model(const PreparedSession& session, controller::LoopModel loop) {
   const description::Grip tightest = description::tightest_grip(session.hand);
   controller::HandModel worst = held_with(tightest, session.hand.mass_kg);
@@ -482,7 +483,7 @@ std::vector<models::JointVector> led_poses(const PreparedSession& session) {
     leads.push_back({.offset_m = models::Vec3(waypoint.offset_m.data())});
     if (is_turned(session)) leads.back().turn_rad = models::Vec3(waypoint.turn_rad.data());
   }
-  // Each sine's two ends, and those of all at once.
+  // Poses at both ends of each sine, and at both ends of the sum of all sines.
   controller::Lead all;
   const auto add_both = [&](const controller::Lead& lead) {
     leads.push_back(lead);
@@ -496,7 +497,7 @@ std::vector<models::JointVector> led_poses(const PreparedSession& session) {
     add_both(end);
   }
   if (session.hand.multisine.size() > 1) add_both(all);
-  // Some dozens of a trajectory's rows, for the sake of time.
+  // Takes about 48 rows of a trajectory, to save time.
   constexpr std::size_t places = 48;
   const std::vector<description::TimedVector>& trajectory = session.hand.trajectory;
   const std::size_t step = std::max<std::size_t>(1, trajectory.size() / places);
@@ -520,7 +521,7 @@ double longest_horizon_s(const PreparedSession& session) {
 }
 
 namespace {
-// In the start pose: gears aren't others elsewhere.
+// Chosen in the start pose, as the gears are the same in every pose.
 void choose_gear_damping(PreparedSession& session) {
   controller::GearDampingChoice& chosen = session.loop.gear_damping;
   chosen = {};
@@ -637,7 +638,7 @@ PreparedSession with_tool(PreparedSession session, double mass_kg, const std::ar
 }
 
 namespace {
-// Of what a hand is to move. Beyond, stability isn't computed: numbers of any size would overflow there.
+// The largest mass for a hand to move. Stability isn't computed beyond it, because numbers would overflow.
 constexpr double heaviest_kg = 10'000.0;
 
 void require_mass_in_range(const PreparedSession& session, const RunOptions& options) {
@@ -649,7 +650,7 @@ void require_mass_in_range(const PreparedSession& session, const RunOptions& opt
                                  .expected = "at most " + description::number_text(heaviest_kg) + " kg"});
 }
 
-// A horizon that was asked for is held against what `auto` would take.
+// A requested horizon may be at most the one that `auto` would choose.
 void require_stable_horizon(const PreparedSession& session) {
   if (session.lookahead.kind != LookaheadChoice::Kind::fixed) return;
   const double longest_s = longest_horizon_s(session);
@@ -668,7 +669,7 @@ void require_stable_horizon(const PreparedSession& session) {
 }  // namespace
 
 void require_inertia_in_range(const PreparedSession& session) {
-  constexpr double most_kg_m2 = 1000.0;  // a tonne, a metre off
+  constexpr double most_kg_m2 = 1000.0;  // a tonne at a distance of a metre
   if (session.settings.orientation == controller::OrientationMode::held) return;
   const double handle_kg_m2 = models::tool_inertia(session.cell.tool).largest_kg_m2, felt = felt_inertia_kg_m2(session);
   if (felt > handle_kg_m2 && felt <= most_kg_m2) return;
@@ -694,7 +695,7 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
                                    .expected = "--bus sim: an unstable mass is for simulation only"});
   }
   try {
-    // Without lookahead first, so that it never makes a mass pass that wouldn't without.
+    // First without lookahead, so that lookahead never makes an otherwise unstable mass pass.
     controller::LoopModel loop = session.loop;
     loop.horizon_s = 0.0;
     controller::require_stable_mass(session.settings.mass_kg, hand_model(session), loop, options.force_unstable);
@@ -717,7 +718,8 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
   const bool is_stable = controller::spectral_radius(hand, alone, inertia_kg_m2 - alone.handle_mass_kg) < 1.0;
   if (is_stable && both->stable(mass_kg, inertia_kg_m2)) return;
   const std::optional<double> least_alone = controller::smallest_stable_mass(hand, alone);
-  if (!least_alone) controller::require_stable_inertia(inertia_kg_m2, hand, alone, false);  // which no mass helps
+  if (!least_alone)
+    controller::require_stable_inertia(inertia_kg_m2, hand, alone, false);  // throws: no inertia is stable
   std::optional<double> smallest = both->smallest_inertia(mass_kg);
   if (smallest) smallest = std::max(*smallest, *least_alone + alone.handle_mass_kg);
   controller::refuse_unstable_pose(mass_kg, inertia_kg_m2, smallest);

@@ -1,4 +1,5 @@
-// What `run`, `sim` and `plan` know before they open a bus: all files loaded and checked, all defaults filled in.
+// Prepares a session for `run`, `sim` and `plan` without opening a bus: loads and checks all files, fills in all
+// defaults.
 #pragma once
 
 #include <string>
@@ -22,75 +23,75 @@ struct PreparedSession {
   description::HandDescription hand;
   scenes::Scene scene;
   std::shared_ptr<const scenes::Clearances> clearances;  // of the scene
-  std::shared_ptr<const models::PoseAlgorithm>
-      rigid;  // scene and tool, for questions of room; null: the tool is a point
+  std::shared_ptr<const models::PoseAlgorithm> rigid;    // scene and tool, for clearances; null: the tool is a point
   controller::SessionSettings settings;
   double duration_s = 10.0;
-  bool damps_gears = true;     // whose torque is measured, as hard as holds
-  LookaheadChoice lookahead;   // what was asked for; settings.horizon_s is what came of it
-  controller::LoopModel loop;  // how the controller expects the closed loop to behave, in the start pose
+  bool damps_gears = true;     // damps gears with measured torque, as strongly as is stable
+  LookaheadChoice lookahead;   // the requested lookahead; settings.horizon_s is the result
+  controller::LoopModel loop;  // the controller's model of the closed loop, in the start pose
 
   [[nodiscard]] bool impedance() const noexcept { return settings.scheme == controller::Scheme::impedance; }
 };
 
-// The hand as the stability check takes it: at the one of its grips that asks for most mass in this loop, which needn't
-// be the stiffest: one that is nearly as stiff and damps little asks for more. Where no mass is stable with one, that.
+// The hand for the stability check, with the grip that needs the most mass in this loop. That isn't always the stiffest
+// grip: one that is nearly as stiff but has little damping needs more. If no mass is stable with some grip, returns
+// that grip.
 controller::HandModel hand_model(const PreparedSession& session, controller::LoopModel loop);
-// In the session's own.
+// The same in the session's own loop.
 controller::HandModel hand_model(const PreparedSession& session);
 
-// The same of the tool's rotation, in Nm/rad, Nms/rad and kg m².
+// The hand and the loop of the tool's rotation, in Nm/rad, Nms/rad and kg m².
 controller::HandModel turning_hand_model(const PreparedSession& session);
 controller::LoopModel turning_loop(const PreparedSession& session);
-// Both at once, as pose_loop_at() takes it, free and where the tool touches with its ends. Absent: the hand doesn't
-// turn the tool.
+// The loop of translation and rotation for pose_loop_at(), free and with the tool's extreme points in contact. Absent:
+// the hand doesn't turn the tool.
 std::optional<controller::PoseLoopModel> turned_model(const PreparedSession& session);
-// The swing of that loop in the start pose that takes longest to die away. Absent: the tool isn't turned, or it isn't
+// The slowest decaying oscillation of that loop in the start pose. Absent: the tool isn't turned, or the loop isn't
 // stable.
 std::optional<controller::Swing> slowest_swing(const PreparedSession& session);
-// What the hand feels, the tool behind the sensor included. Precondition: the orientation is free.
+// The inertia that the hand feels, the load behind the sensor included. Precondition: the orientation is free.
 double felt_inertia_kg_m2(const PreparedSession& session);
 
-// The poses that the hand means to lead the arm to, beginning with the start, whatever the scene has in its way.
+// The poses that the hand means to lead the arm to, the start first. Objects of the scene are ignored.
 std::vector<models::JointVector> led_poses(const PreparedSession& session);
-// The loop in all of them.
+// The loop in all these poses.
 controller::LoopModel led_loop(const PreparedSession& session);
 
-// The longest horizon of a lookahead that is stable with margins for the session's mass and loop.
+// The longest stable lookahead horizon, with margins, for the session's mass and loop.
 double longest_horizon_s(const PreparedSession& session);
 
-// The lookahead's horizon for the session's mass and loop. To be called when one of them has changed.
+// Sets the lookahead horizon. Call it after each change of the session's mass or loop.
 void choose_horizon(PreparedSession& session);
 
 // Throws SetupError. Opens no bus and starts nothing.
 PreparedSession prepare(const RunOptions& options);
 
-// The same session with another timestep. Throws SetupError where no drive could hold that one.
+// Returns the session with another timestep. Throws SetupError if no drive could hold it.
 PreparedSession with_timestep(PreparedSession session, const RunOptions& options, double period_s);
 
-// The same session with another mass (kg) and centre of mass (m, in S) of the tool behind the sensor. The inertia of a
-// tool with a shape that turns stays as it is felt.
+// Returns the session with another mass (kg) and centre of mass (m, in S) of the tool behind the sensor. If a tool with
+// a shape turns, its felt inertia stays the same.
 PreparedSession with_tool(PreparedSession session, double mass_kg, const std::array<double, 3>& centre_S_m);
 
-// The same session with drives that measure the torque of each gear that has a stiffness, so.
+// Returns the session with drives that measure the torque of each elastic gear as `torque` says.
 PreparedSession with_gear_torques(PreparedSession session, const description::GearTorque& torque);
 
-// Where the timestep comes from, as a problem begins that is to be told of it: `--timestep`, or the cell's file and
-// line. Without a line, the file says nothing of it and has the default.
+// Returns a problem with the origin of the timestep filled in: `--timestep`, or the cell's file and line. Without a
+// line, the file doesn't set the timestep.
 description::SetupProblem timestep_problem(const description::Cell& cell, const RunOptions& options);
 
-// The mass and timestep, judged: throws SetupError where the handle alone is heavier, or where the loop with the hand
-// would be unstable (unless forced, which only a simulation may be). Impedance type: the virtual coupling is judged.
+// Throws SetupError if the handle alone is heavier than the mass, or if the loop with the hand would be unstable
+// (unless forced, in simulation only). Impedance type: checks the virtual coupling.
 void require_stable(const PreparedSession& session, const RunOptions& options);
 
-// The inertia of a tool that turns: throws SetupError at or below the handle's own, and for one that nothing turns.
+// Throws SetupError if a turning tool's inertia isn't above the handle's own, or is too large to be turned.
 void require_inertia_in_range(const PreparedSession& session);
 
-// From the proxy's step to the links being where it went: latched at the next SYNC, reached a period later, and what
-// the filter of the setpoints takes. Impedance type: 0, the proxy is where the tool may be.
+// The delay from the proxy's step to the links: the setpoint is latched at the next SYNC and reached a period later,
+// and the setpoint filter adds its delay. Impedance type: 0, as the proxy stays where the tool may be.
 double motion_delay_s(const PreparedSession& session);
 
-// Total delay from a force on the handle to the arm being where the proxy went, in seconds.
+// The delay from a force on the handle to the arm having followed the proxy (s).
 double total_delay_s(const PreparedSession& session);
 
 }  // namespace proxarm::command_line

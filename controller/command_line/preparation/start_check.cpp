@@ -29,12 +29,12 @@ namespace {
 using description::SetupError;
 using models::Vec3;
 
-// A start on a surface is fine. start_rad has four decimals in most files: half of the last one on an arm of 1.4 m is
-// 0.07 mm; the first step brings the proxy out of that.
+// A start on a surface is allowed. start_rad has four decimals in most files. Half of the last one is 0.07 mm on an arm
+// of 1.4 m, and the proxy's first step corrects that.
 constexpr double start_tolerance_m = 1e-4;
 
-// The share of a drive's torque that the arm's weight may take: the rest is for accelerating and braking, for friction
-// (3 % in the default cell), for the hand's pull (200 N at 1.5 m: 12 %), and for the gears' overshoot.
+// The share of a drive's torque that the arm's weight may take. The rest is for accelerating and braking, friction (3 %
+// in the default cell), the hand's pull (200 N at 1.5 m: 12 %), and the gears' overshoot.
 constexpr double heavy_share = 0.4;
 
 std::string point_text(const Vec3& point_W) {
@@ -43,8 +43,8 @@ std::string point_text(const Vec3& point_W) {
   return text;
 }
 
-// In m/rad. Torques render forces at the point alone; positions need the tool's orientation as well, where there are
-// axes for it.
+// Smallest singular value of the tool's Jacobian at the start, m/rad. The impedance type renders forces at the point
+// alone, so on six or more axes it counts translation only.
 double smallest_singular_value(const PreparedSession& session, const models::Arm& arm) {
   if (session.impedance() && arm.axes() >= 6) {
     models::ToolKinematics tool;
@@ -80,9 +80,9 @@ std::string vector_text(const Vec3& v) {
   return text;
 }
 
-// What the scene renders must be where the tool can go.
+// The scene's space must lie within the space in which the tool can move.
 void require_reachable_space(const PreparedSession& session, const models::Arm& arm, const Vec3& start_W) {
-  constexpr double leaves = 2e-3;  // as what tool_space() takes for a rounded number, and one in the scene
+  constexpr double leaves = 2e-3;  // tool_space() tolerates 1e-3 for rounded numbers; as much again for the scene's
   const models::ToolSpace reach = models::tool_space(arm);
   const scenes::Space& space = session.scene.space;
   const models::Mat3 off = models::Mat3::Identity() - reach.projection();
@@ -101,7 +101,7 @@ void require_reachable_space(const PreparedSession& session, const models::Arm& 
                               vector_text(start_W) + ", axes: [" + axes + "]}` into the scene"});
 }
 
-// A hand that turns the tool as it likes needs all of its orientation.
+// Free orientation needs all three rotations of the tool.
 void require_turning(const PreparedSession& session, const models::Arm& arm) {
   if (session.settings.orientation == controller::OrientationMode::held || arm.axes() >= 6) return;
   throw SetupError({.key = "--orientation",
@@ -109,7 +109,7 @@ void require_turning(const PreparedSession& session, const models::Arm& arm) {
                     .expected = "held: fewer than six axes can't turn the tool as a hand likes"});
 }
 
-// The object that the point is deepest in, as a scene of its own has it.
+// Returns the object that contains the point most deeply; each object is judged alone.
 const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
   const scenes::Object* found = nullptr;
   double least_m = std::numeric_limits<double>::infinity();
@@ -138,8 +138,8 @@ void require_outside(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move or turn the object, or change start_rad in the cell file"});
 }
 
-// A rigid tool must start outside of everything: 𝒢 has no way out of a solid. The start is known as well as start_rad,
-// and so is a touch.
+// A rigid tool must start outside all objects, because 𝒢 can't lead out of a solid. Contact is allowed, within the
+// accuracy of start_rad.
 void require_room(const PreparedSession& session, const models::Pose& start) {
   const double clearance_m = session.rigid->clearance_m(models::tool_pose(start));
   if (clearance_m >= 0.0) return;
@@ -161,7 +161,7 @@ double first_step_m(const scenes::CompiledScene& world, const Vec3& start_W) {
   return (world.algorithm<N>()(1.0, start, start) - start).norm();
 }
 
-// A guide that is not at the tool would draw the proxy onto it in one step.
+// If the tool isn't on the guide, the guide would pull the proxy onto it in one step.
 void require_on_guide(const PreparedSession& session, const Vec3& start_W) {
   if (!session.scene.guide) return;
   const scenes::CompiledScene world = scenes::compile(session.scene);
@@ -177,8 +177,8 @@ void require_on_guide(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move the guide, or change start_rad in the cell file"});
 }
 
-// In a space of fewer dimensions the proxy moves beside the tool by as much as the tool starts beside the space: what
-// the file puts in its way would not be where it is felt.
+// In a space of fewer dimensions the proxy stays beside the tool by the distance at which the tool starts from the
+// space. Objects would then be felt at a place other than the file's.
 void require_in_space(const PreparedSession& session, const Vec3& start_W) {
   const scenes::Space& space = session.scene.space;
   const auto axes = space.axes.leftCols(space.dimensions);
@@ -194,10 +194,11 @@ void require_in_space(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move space.origin_m, or change start_rad in the cell file"});
 }
 
-// Within the workspace, and in no zone to be kept out of, by as much as the tool stops before their borders.
+// The start must be inside the workspace and outside all keep-out boxes, at least the tool's stopping setback from
+// their borders.
 void require_allowed(const PreparedSession& session, const models::Vec3& start_W) {
   const description::CellLimits& limits = session.cell.limits;
-  // less_m(thickness): by how much smaller the box is on each of its sides.
+  // less_m(thickness): how much smaller the box is on each side.
   const auto inside = [&](const std::array<double, 3>& min_m, const std::array<double, 3>& max_m, auto less_m) {
     const models::Vec3 min(min_m.data()), max(max_m.data());
     const models::Vec3 less = (max - min).unaryExpr(less_m);
@@ -221,7 +222,7 @@ void require_allowed(const PreparedSession& session, const models::Vec3& start_W
   }
 }
 
-// "148 of the 132 Nm", of a share of what the drive has.
+// For example "148 of the 132 Nm": the weight's torque and a share of the drive's.
 std::string weight_text(const models::Arm& arm, const controller::HeldWeight& held, double share) {
   char text[64];
   std::snprintf(text, sizeof text, "%.3g of the %.3g %s", held.weight_Nm, share * held.rated_Nm,
@@ -233,7 +234,7 @@ const std::string& joint_of(const PreparedSession& session, const controller::He
   return session.cell.drives[static_cast<std::size_t>(held.axis)].joint;
 }
 
-// A drive that can't hold the arm's weight can't hold its start.
+// If a drive can't hold the arm's weight, it can't hold the start pose.
 void require_weight_held(const PreparedSession& session, const models::Arm& arm) {
   const controller::HeldWeight held = controller::held_weight(arm, session.cell, arm.start_rad());
   if (held.share() < 1.0) return;
@@ -245,9 +246,9 @@ void require_weight_held(const PreparedSession& session, const models::Arm& arm)
                     .advice = "start nearer to the base, or correct max_torque_Nm or the masses of the URDF"});
 }
 
-// Warns of a weight that leaves a drive too little torque to accelerate and brake with.
+// Warns if the weight leaves a drive too little torque to accelerate and brake.
 std::vector<std::string> weight_surprises(const PreparedSession& session, const models::Arm& arm) {
-  if (session.impedance()) return {};  // renders torques, beside the weight's
+  if (session.impedance()) return {};  // its torques are rendered on top of the weight's
   const controller::HeldWeight most = controller::heaviest_weight(arm, session.cell);
   if (most.share() < heavy_share) return {};
   return {session.cell.file.string() + ": " + joint_of(session, most) + ": at the worst the arm's weight takes " +
@@ -256,8 +257,8 @@ std::vector<std::string> weight_surprises(const PreparedSession& session, const 
                               : "such poses the drive can't hold it")};
 }
 
-// No arm swings a tool that is longer than itself; one in millimetres is a thousand times as long as it should be.
-// What it pushes by at the start is taken for the sensor's zero, or is Fault::force_at_start.
+// Warns of a simulated hand that pulls at the start: the sensor's tare would take that force for its zero, or raise
+// Fault::force_at_start.
 std::vector<std::string> hand_surprises(const PreparedSession& session) {
   const description::HandDescription& hand = session.hand;
   std::array<double, 3> at_m{};
@@ -309,7 +310,7 @@ void require_runnable(const PreparedSession& session, const RunOptions& options)
 
 std::vector<std::string> surprises(const PreparedSession& session) {
   const models::Arm arm(session.cell);
-  // No joint's axis is further from the tool than the arm can reach.
+  // The arm's reach: no joint's axis is further from the tool.
   const double reach_m = std::max(arm.path_curvature().maxCoeff(), 0.1);
   std::vector<std::string> lines = controller::cell_doubts(session.cell, arm);
   const auto add = [&](const std::vector<std::string>& more) { lines.insert(lines.end(), more.begin(), more.end()); };

@@ -41,11 +41,11 @@ std::optional<Alternative::Kind> kind_of(YamlFact::Kind kind) {
     case YamlFact::Kind::choice:
       return Alternative::Kind::choice;
     default:
-      return std::nullopt;  // maps are known by their places, the others say nothing about the kind
+      return std::nullopt;  // places tell maps apart; other facts don't tell the kind
   }
 }
 
-// Within one place all facts hold.
+// All facts of one place apply.
 void narrow(Alternative& a, const YamlFact& fact) {
   if (fact.range.min > a.range.min || (fact.range.min == a.range.min && fact.range.above_min)) {
     a.range.min = fact.range.min;
@@ -65,7 +65,7 @@ void leave_out(std::vector<Alternative>& all, Alternative::Kind kind) {
   std::erase_if(all, [&](const Alternative& a) { return a.kind == kind; });
 }
 
-// The kinds of value that a key was read as in one place.
+// The kinds of value that the reader takes for a key in one place.
 std::vector<Alternative> scalars_of(const KeyFacts& facts) {
   using Kind = Alternative::Kind;
   std::vector<Alternative> all;
@@ -76,7 +76,7 @@ std::vector<Alternative> scalars_of(const KeyFacts& facts) {
     if (same == all.end()) same = all.insert(all.end(), Alternative{.kind = *kind, .outer = fact.range});
     narrow(*same, fact);
   }
-  // Paths and choices are read as texts; lists of numbers also as lists.
+  // Paths and choices are also read as texts, lists of numbers also as lists.
   if (has(all, Kind::path) || has(all, Kind::choice)) leave_out(all, Kind::text);
   if (has(all, Kind::numbers)) leave_out(all, Kind::list);
   for (const YamlFact& fact : facts.facts) {
@@ -89,7 +89,8 @@ std::vector<Alternative> scalars_of(const KeyFacts& facts) {
   return all;
 }
 
-// In several places: what holds in all of them. Bounds that differ are other keys' values. Whether they do.
+// Merges what several places accept. Bounds that differ depend on other keys' values. Returns whether something
+// differs.
 bool widen(Alternative& a, const Alternative& b) {
   bool differs = false;
   if (a.outer.min != b.outer.min) a.outer.min = lowest;
@@ -133,7 +134,7 @@ class Builder {
     for (const Place* root : specimens.roots()) note_paths(*root);
   }
 
-  // Adds the contradictions that nothing explains to `contradictions`.
+  // Adds the number of unexplained contradictions to `contradictions`.
   MapModel build(const Places& places, int& contradictions) const {
     MapModel model{.path = places.front()->path};
     model.exactly_one = places.front()->exactly_one;
@@ -157,7 +158,7 @@ class Builder {
     return keys;
   }
 
-  // A map of names: what is asked of any of them.
+  // Builds a map of names: all names have the same facts.
   MapModel build_names(const Places& places, MapModel model, int& contradictions) const {
     std::vector<std::unique_ptr<Place>> made;
     Places views;
@@ -189,7 +190,7 @@ class Builder {
     return model;
   }
 
-  // What all these places say of a key together.
+  // Merges what all these places say of a key.
   Found summarise(const std::string& key, const Places& places) const {
     Found found;
     std::optional<Standing> standing;
@@ -206,7 +207,7 @@ class Builder {
       if (facts->otherwise) defaults.emplace(facts->otherwise->dump(), *facts->otherwise);
       some_without = some_without || !facts->otherwise;
     }
-    // A comment that says what it is without the key knows better: it is another key's value, or is found by it.
+    // If the comment states the default, that takes precedence: the default is another key's value or follows from it.
     const bool in_words = specimens_.meaning(places.front()->path, key).find("default:") != std::string::npos;
     if (!some_without && !in_words) {
       for (const auto& [text, value] : defaults) found.as.otherwise.push_back(value);
@@ -247,7 +248,7 @@ class Builder {
     return all;
   }
 
-  // As what a key was read here; empty where it was only asked for.
+  // The kinds of value that the reader takes for a key here; empty if it only asked whether the key is there.
   static std::string kinds_of(const Place& place, const KeyFacts& facts) {
     std::string kinds;
     for (const Alternative& a : scalars_of(facts)) kinds += static_cast<char>('a' + static_cast<int>(a.kind));
@@ -257,7 +258,7 @@ class Builder {
     return kinds;
   }
 
-  // The value by which a key decides, as the reader takes it; none where it can't decide.
+  // The value by which a key decides about others, as the reader takes it; nullopt if it can't decide.
   static std::optional<std::string> decision(const Place& place, const KeyFacts& facts) {
     const auto here = place.there.find(facts.key);
     for (const YamlFact& fact : facts.facts) {
@@ -272,8 +273,8 @@ class Builder {
     return here != place.there.end() ? "+" : "-";
   }
 
-  // Of the keys by which this one is said to differ those that every one of these places was asked for, and that
-  // differ.
+  // Of the keys that this key's comment names, returns those that all these places were asked for and that differ among
+  // them.
   std::vector<std::string> deciders(const std::string& key, const Places& places) const {
     std::vector<std::string> all;
     for (const std::string& decider : specimens_.deciders(places.front()->path, key)) {
@@ -298,11 +299,12 @@ class Builder {
     return groups;
   }
 
-  // Into `cases`; returns how many contradictions stay.
+  // Splits the key's facts into `cases`; returns the number of remaining contradictions.
   int split(const std::string& key, const Places& places, const std::vector<Condition>& when,
             std::vector<KeyCase>& cases) const {
     const Found whole = summarise(key, places);
-    // The first one that helps; else the first one, since another may help within its groups.
+    // The first decider that reduces contradictions; else the first one, since another may reduce them within its
+    // groups.
     std::string best;
     if (whole.contradictions > 0) {
       for (const std::string& decider : deciders(key, places)) {
@@ -320,7 +322,7 @@ class Builder {
       fill(key, places.front()->path, cases.back());
       return whole.contradictions;
     }
-    // Groups of which the same holds are one case.
+    // Groups with the same result become one case.
     std::map<std::string, std::pair<Places, std::vector<std::string>>> same;
     for (const auto& [value, group] : grouped(places, best)) {
       auto& [together, values] = same[signature(summarise(key, group).as)];
@@ -361,7 +363,7 @@ class Builder {
     return condition;
   }
 
-  // What none of these places has is taken from other places of the same path.
+  // Takes what none of these places has from other places with the same path.
   void fill(const std::string& key, const std::string& path, KeyCase& as) const {
     const auto same = by_path_.find(path);
     if (as.standing == Standing::refused || same == by_path_.end()) return;
@@ -394,7 +396,6 @@ class Builder {
   std::map<std::string, Places> by_path_;
 };
 
-// Throws if the specimens leave something open.
 void require_complete(const MapModel& model) {
   for (const KeyModel& key : model.keys) {
     if (key.meaning.empty() && !model.names && !is_refused(key)) {

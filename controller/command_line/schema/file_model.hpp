@@ -1,8 +1,8 @@
-// What a kind of file may hold, in one piece: the facts of all specimens' places put together, and where they differ
-// the condition that tells the cases apart.
+// Builds a model of everything that a kind of file may hold. It merges the facts from all specimens; where they differ,
+// it keeps the condition that distinguishes the cases.
 //
-// A specimen's comment says by which keys another one differs; how it does is heard. What differs without such a key
-// (bounds that are other keys' values) is left as wide as the reader first asked.
+// A specimen's comment names the keys on which another key depends; how it depends is learnt from the reader. A
+// difference without such a key (bounds that are other keys' values) gets the range that the reader asked for first.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,8 @@
 
 namespace proxarm::command_line {
 
-// On a key beside: that it has one of these values (`or_absent`: or isn't there), or that it is there, or isn't.
+// A condition on another key of the same map: it has one of these values (with `or_absent`: or is absent), is present,
+// or is absent.
 struct Condition {
   enum class Kind : std::uint8_t { values, there, absent };
   Kind kind = Kind::values;
@@ -29,9 +30,9 @@ struct Alternative {
   enum class Kind : std::uint8_t { map, list, numbers, number, integer, boolean, text, path, choice };
   Kind kind = Kind::text;
   description::Range range{};
-  description::Range outer{};  // what the reader asked first: the bounds whatever other keys say
-  bool zero = false;           // 0 as well
-  bool is_bounded = true;      // false: its bounds are what other keys say
+  description::Range outer{};  // the range that the reader asked for first, which holds whatever other keys say
+  bool zero = false;           // 0 is also allowed
+  bool is_bounded = true;      // false: its bounds are other keys' values
   std::size_t min_size = 0, max_size = static_cast<std::size_t>(-1);
   std::vector<std::string> choices{};
   std::vector<std::int64_t> values{};
@@ -41,11 +42,11 @@ struct Alternative {
 };
 
 struct KeyCase {
-  std::vector<Condition> when{};  // all of them
+  std::vector<Condition> when{};  // all must hold
   Standing standing = Standing::optional;
-  std::vector<description::Json> otherwise{};  // one, or several that what else the file says chooses from
+  std::vector<description::Json> otherwise{};  // the default; several if other keys choose among them
   std::vector<Alternative> value{};
-  bool is_wide = false;  // keys may stand elsewhere for all such maps, so that none of them must be here (wide_map.hpp)
+  bool is_wide = false;  // defaults for such maps may set its keys elsewhere, so no key is required here (wide_map.hpp)
 };
 
 struct KeyModel {
@@ -54,22 +55,23 @@ struct KeyModel {
   std::vector<KeyCase> cases{};  // one without a condition, or several
 };
 
-// The unit that a number of this key has by its name; empty for what is no number.
+// Returns the unit that a number of this key has by its name; empty if it isn't a number.
 std::string unit_of(const KeyModel& key);
 
-// Whether the key must not be there in any case.
+// Returns whether the key is refused in every case.
 bool is_refused(const KeyModel& key) noexcept;
 
 struct MapModel {
   std::string path;
   std::vector<KeyModel> keys{};
-  std::optional<std::string> names{};  // keys are the user's names: `keys` has one, whose cases hold for each
+  std::optional<std::string>
+      names{};  // pattern of keys that are names of the user's choice; `keys` then has one model for all
   std::vector<std::string> exactly_one{};
-  std::string keys_of{};  // not empty: its keys are some of the maps' at that path
+  std::string keys_of{};  // not empty: its keys are a subset of the keys of the maps at that path
 };
 
-// Throws SetupError if the specimens leave something open: a key that none of them has, a key without a meaning, a
-// choice that decides about other keys and isn't made in any.
+// Throws SetupError if the specimens are incomplete: a key in no specimen, a key without a meaning, a choice that
+// decides about other keys and that no specimen makes.
 MapModel model_of(const Specimens& specimens);
 
 }  // namespace proxarm::command_line

@@ -10,7 +10,7 @@ namespace {
 
 using description::Json;
 
-// Whole numbers are written as such, as far as a double holds them exactly.
+// Writes whole numbers as integers, up to the largest that a double holds exactly.
 Json number_json(double value) {
   constexpr double exact = 9007199254740992.0;  // 2⁵³
   if (value >= -exact && value <= exact && value == static_cast<double>(static_cast<std::int64_t>(value))) {
@@ -47,7 +47,7 @@ Json text_schema(const Alternative& a, bool alone) {
   Json types = Json::array();
   types.push_back("string");
   if (a.pattern.empty()) {
-    // A text that looks like a number or a truth value is a text to the reader all the same.
+    // The reader takes a text that looks like a number or a truth value as a text.
     if (alone) types.push_back("number"), types.push_back("boolean");
     return {{"type", types},
             {"minLength", 1},
@@ -130,7 +130,7 @@ Json described(const KeyModel& key, const std::string& unit) {
   return schema;
 }
 
-// What holds under the same conditions stands together.
+// Properties and required keys under one condition.
 struct Branch {
   Json condition{}, properties = Json::object(), required = Json::array();
 };

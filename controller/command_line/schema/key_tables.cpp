@@ -135,14 +135,14 @@ std::string default_text(const KeyCase& one) {
   return joined(words, " or ");
 }
 
-// Tables may not hold a bar of their own.
+// Escapes bars, which separate the table's columns.
 std::string cell(const std::string& text) {
   std::string safe;
   for (const char c : text) safe += c == '|' ? std::string("\\|") : std::string(1, c);
   return safe;
 }
 
-// Texts with the conditions under which they hold; those that hold in all cases without any.
+// Texts with the conditions under which they apply; a text for all cases gets no condition.
 class Cases {
  public:
   void add(const std::string& text, const std::vector<Condition>& when) {
@@ -164,7 +164,7 @@ class Cases {
   std::vector<std::pair<std::string, std::vector<std::string>>> texts_;
 };
 
-// The cases that a table shows: of a key whose maps may have defaults, those that hold without defaults.
+// The cases that a table shows. If a key's maps may have defaults, these are the cases without defaults.
 std::vector<KeyCase> told(const KeyModel& key) {
   std::vector<KeyCase> cases = key.cases;
   if (std::erase_if(cases, [](const KeyCase& one) { return one.is_wide; }) == 0) return cases;

@@ -1,4 +1,4 @@
-// A model of a kind of file as tables in Markdown: each key with unit, default, range and meaning.
+// Writes the model of a kind of file as Markdown tables: each key with unit, default, range and meaning.
 #pragma once
 
 #include <string>

@@ -34,7 +34,7 @@ std::string without_indices(const std::string& path) {
 
 std::string joined(const std::string& path, const std::string& key) { return path.empty() ? key : path + "." + key; }
 
-// What a specimen holds, read without a journal: its maps and lists by their paths, and its comments.
+// A specimen's content, read without a journal: its maps and lists by path, and its comments.
 struct Content {
   std::vector<std::string> lines{};
   std::map<std::string, Place> places{};
@@ -65,7 +65,7 @@ struct Content {
     }
   }
 
-  // The comment of a line belongs to the line's first key. A value may begin in a line below its key.
+  // A line's comment belongs to the line's first key. A value may begin in a line below its key.
   void note_meaning(const std::string& path, const std::string& key, int line) {
     static const std::regex parts(R"re(^[-\s{]*"?([^\s:"]+)"?:.*?\s#\s(.*)$)re"),
         plain(R"re(^[-\s{]*"?([^\s:"]+)"?:.*$)re");
@@ -73,7 +73,7 @@ struct Content {
       const std::string& text = lines[static_cast<std::size_t>(i - 1)];
       std::smatch found;
       if (!std::regex_match(text, found, plain) || found[1] != key) {
-        if (text.find(key + ":") != std::string::npos) return;  // somewhere in a line that begins with another key
+        if (text.find(key + ":") != std::string::npos) return;  // in a line that begins with another key
         continue;
       }
       if (std::regex_match(text, found, parts)) meanings.emplace_back(path, found[2]);
@@ -97,7 +97,7 @@ class Listener final : public description::YamlJournal {
       place.asked.push_back({.key = std::string(key)});
       facts = place.asked.end() - 1;
     }
-    // Whether a reader can do without the key: it doesn't ask whether it is there before it takes it.
+    // A key is required if the reader takes it without first asking whether it is there.
     const bool must = fact.kind == YamlFact::Kind::required;
     if (!facts->is_told && must) facts->standing = Standing::required;
     facts->is_told = facts->is_told || must || fact.kind == YamlFact::Kind::asked;

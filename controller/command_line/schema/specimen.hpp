@@ -1,5 +1,5 @@
-// Specimens: files that together have every key that a kind of file can have, each with its meaning as a comment behind
-// it. They are read by the program's own readers while a journal listens (yaml_journal.hpp); what is heard is kept
+// Reads specimens: files that together have every key of a kind of file, each with its meaning as a comment. The
+// program's own readers read them while a journal records their questions (yaml_journal.hpp). The answers are kept
 // here, place by place.
 #pragma once
 
@@ -17,11 +17,11 @@ namespace proxarm::command_line {
 
 enum class Standing : std::uint8_t { optional, required, refused };
 
-// What was asked of one key in one place. An element of a list counts as a key without a name.
+// What a reader asked about one key in one place. A list's element is a key without a name.
 struct KeyFacts {
   std::string key;
   Standing standing = Standing::optional;
-  bool is_told = false;  // its standing, by the first question that says it
+  bool is_told = false;  // whether the standing is known; the first question that tells it counts
   std::vector<description::YamlFact> facts{};
   std::optional<description::Json> otherwise{};
 };
@@ -32,9 +32,9 @@ struct Place {
   std::string key;   // in the place that holds it; empty for an element of a list
   bool is_list = false;
   std::vector<KeyFacts> asked{};               // in the order of the first question
-  std::map<std::string, std::string> there{};  // what the file has here; of scalars their text
+  std::map<std::string, std::string> there{};  // what the file has here; text of scalars
   std::vector<const Place*> children{};
-  std::optional<std::string> names{};  // keys are names, which fit this pattern (empty: any)
+  std::optional<std::string> names{};  // keys are names that match this pattern (empty: any)
   std::vector<std::string> exactly_one{};
 
   [[nodiscard]] const KeyFacts* find(const std::string& name) const;
@@ -42,17 +42,17 @@ struct Place {
 
 class Specimens {
  public:
-  // Reads all specimens of a kind (cell, hand, scene, sensor, drive), in the folder of its name below `folder`.
+  // Reads all specimens of a kind (cell, hand, scene, sensor, drive), from the folder of that name below `folder`.
   Specimens(const std::filesystem::path& folder, const std::string& kind);
 
   [[nodiscard]] const std::vector<const Place*>& roots() const noexcept { return roots_; }
-  // The comment behind that key: behind the key of this path, else of the path whose end is alike the furthest, the
-  // first of those. Empty if there is none.
+  // Returns the comment of the key with this path, else of the first key whose path agrees in the most names, counted
+  // from its end. Empty if there is none.
   [[nodiscard]] std::string meaning(const std::string& path, const std::string& key) const;
-  // A comment may begin with "(by KEY, KEY)": what is asked of its key differs by what those beside it say.
+  // Returns the keys on which this key depends: its comment may begin with "(by KEY, KEY)".
   [[nodiscard]] std::vector<std::string> deciders(const std::string& path, const std::string& key) const;
-  // A comment may begin with "(of PATH)": its key is a map of keys that all maps there have from it. That path, or
-  // none.
+  // Returns PATH if the key's comment begins with "(of PATH)": the key is a map of defaults for all maps there. Empty
+  // otherwise.
   [[nodiscard]] std::string shared_by(const std::string& path, const std::string& key) const;
 
  private:

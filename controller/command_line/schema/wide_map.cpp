@@ -57,14 +57,14 @@ MapModel wide(const MapModel& map) {
   return all;
 }
 
-// A map's key, of a map that may be changed or not.
+// Finds a key; `map` may be const.
 auto& key_of(auto& map, const std::string& name) {
   const auto found = std::ranges::find(map.keys, name, &KeyModel::name);
   if (found != map.keys.end()) return *found;
   throw description::SetupError({.key = map.path + "." + name, .message = "the specimens don't have this key"});
 }
 
-// drives[].simulation: of the first case of each key.
+// Finds a map such as drives[].simulation, by the first case of each key.
 const MapModel& map_at(const MapModel& root, const std::string& path) {
   const MapModel* map = &root;
   std::istringstream names(path);
@@ -76,7 +76,7 @@ const MapModel& map_at(const MapModel& root, const std::string& path) {
   return *map;
 }
 
-// The maps of the list `key` have keys from those of `sharing`, where one of these is there.
+// Makes the list's maps accept defaults from the keys in `sharing`: no key is required while one of these is present.
 void widen_list(KeyModel& key, const std::vector<std::string>& sharing) {
   KeyCase any = key.cases.front();
   any.is_wide = true;
@@ -91,7 +91,7 @@ void widen_list(KeyModel& key, const std::vector<std::string>& sharing) {
 }  // namespace
 
 void share_keys(MapModel& root, const Specimens& specimens) {
-  std::vector<std::pair<std::string, std::vector<std::string>>> lists;  // and the keys that share theirs
+  std::vector<std::pair<std::string, std::vector<std::string>>> lists;  // with the keys that hold their defaults
   for (KeyModel& key : root.keys) {
     const std::string path = specimens.shared_by(root.path, key.name);
     if (path.empty()) continue;

@@ -1,9 +1,8 @@
-// Who writes the black box when a session ends in a fault, or ends by dying: a process of its own.
+// Writes the black box from a separate process when a session ends in a fault or crashes.
 //
-// It is forked off before the session opens anything and starts a thread, shares the box's memory, and sleeps until its
-// end of a pipe says how the session ended, or falls shut without a word. A signal handler would have to do with what
-// is async-signal-safe, with the stack and heap that the crash has left, and never sees SIGKILL; a process that isn't
-// ill itself writes files in the ordinary way, whatever the session died of. It costs the cycle nothing.
+// The process is forked before the session opens files or starts threads. It shares the box's memory and sleeps until
+// its pipe reports the session's end or closes. A signal handler could only make async-signal-safe calls on a damaged
+// stack and heap, and would never see SIGKILL. The cycle has no extra work.
 #pragma once
 
 #include <filesystem>
@@ -17,19 +16,19 @@ namespace proxarm::command_line {
 
 class BlackBoxKeeper {
  public:
-  // `session` and `options` must outlive it. No other thread may run yet. Throws SetupError where --black-box names a
-  // folder that can't be used.
+  // Preconditions: `session` and `options` outlive this object; no other thread runs yet. Throws SetupError if
+  // --black-box names an unusable folder.
   BlackBoxKeeper(const PreparedSession& session, const RunOptions& options);
   BlackBoxKeeper(const BlackBoxKeeper&) = delete;
   BlackBoxKeeper& operator=(const BlackBoxKeeper&) = delete;
-  ~BlackBoxKeeper();  // the box is written, unless finish() said otherwise
+  ~BlackBoxKeeper();  // writes the box unless finish() was called
 
   [[nodiscard]] controller::BlackBox& box() noexcept { return box_; }
-  // Which buses the session turned out to be on; before the first cycle.
+  // Sets which buses the session is on. Call it before the first cycle.
   void set_head(const controller::ReplayHead& head) noexcept;
   [[nodiscard]] const controller::ReplayHead& head() const noexcept;
-  // The session is over. With a fault, named by `reason`, the box is written before this returns, or a line on standard
-  // error says why not. True: it was written.
+  // Ends the session. `reason` names its fault; empty: no fault. With a fault the box is written before this returns,
+  // or an error is printed on standard error. Returns whether it was written.
   bool finish(const std::string& reason);
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
 
@@ -42,7 +41,7 @@ class BlackBoxKeeper {
   const PreparedSession& session_;
   std::filesystem::path folder_;
   controller::BlackBox box_;
-  Shared* shared_;  // as the box's memory
+  Shared* shared_;  // in memory shared with the keeper's process
   int say_ = -1;
   int child_ = -1;
 };

@@ -9,7 +9,6 @@
 namespace proxarm::command_line {
 namespace {
 
-// Each bus that has drives, once.
 std::vector<fieldbus::BusToLead> buses_to_lead(std::span<const fieldbus::DriveSlot> drives) {
   std::vector<fieldbus::BusToLead> buses;
   for (const fieldbus::DriveSlot& slot : drives) {

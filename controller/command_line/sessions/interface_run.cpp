@@ -39,7 +39,7 @@ using controller::CycleRecord;
 using fieldbus::SocketCanNetwork;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr std::size_t record_capacity = 8192;  // 8 s at 1 kHz, should a disk take that long
+constexpr std::size_t record_capacity = 8192;  // 8 s at 1 kHz, in case a disk takes that long
 constexpr std::size_t frame_capacity = 262144;
 constexpr auto drain_interval = std::chrono::milliseconds(5);
 
@@ -62,8 +62,8 @@ std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const c
   return rates;
 }
 
-// Takes records and frames out of the cycle's rings and hands them on, in a thread of its own. Counts how long the
-// frames would occupy a bus of the cell's bitrates, since a virtual interface takes no time.
+// Takes records and frames out of the cycle's rings in a separate thread and passes them on. Since a virtual interface
+// takes no time, it also counts how long the frames would occupy a bus with the cell's bitrates.
 class Drain {
  public:
   Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output,
@@ -85,14 +85,14 @@ class Drain {
   Drain& operator=(const Drain&) = delete;
   ~Drain() { join(); }
 
-  // Throws what kept the record from being written.
+  // Throws the exception that stopped the record, if any.
   void finish() {
     join();
     if (failure_) std::rethrow_exception(failure_);
     drain();
   }
 
-  // After finish(): the load of each interface, by its name.
+  // Call after finish(). Returns the load of each interface, by name.
   [[nodiscard]] std::map<std::string, double> loads() const {
     std::map<std::string, double> loads;
     for (std::size_t bus = 0; bus < busy_ns_.size() && last_ns_ > begun_ns_; ++bus) {
@@ -107,7 +107,7 @@ class Drain {
     ended_.store(true, std::memory_order_release);
     thread_.join();
   }
-  // Nothing is thrown out of a thread while the arm moves: the session makes a controlled stop first.
+  // An exception must not leave the thread while the arm moves: first the session makes a controlled stop.
   void loop() {
     try {
       while (!ended_.load(std::memory_order_acquire)) {
@@ -146,7 +146,7 @@ class Drain {
   controller::ReplayRecorder* replay_;
   controller::RecordedMessages* messages_;
   std::function<void()> on_failure_;
-  std::exception_ptr failure_;  // the thread's; read after it has ended
+  std::exception_ptr failure_;  // set by the thread; read after it has ended
   std::vector<std::int64_t> busy_ns_;
   std::int64_t begun_ns_;
   std::int64_t last_ns_ = 0;

@@ -1,4 +1,4 @@
-// `proxarm run --bus vcan0`: the controller on CAN interfaces of the kernel, in real time.
+// `proxarm run --bus can0`: the controller on CAN interfaces of the kernel, in real time.
 #pragma once
 
 #include "controller/command_line/preparation/prepared_session.hpp"
@@ -6,8 +6,8 @@
 
 namespace proxarm::command_line {
 
-// Returns the exit status; throws SetupError while nothing has moved. Refuses interfaces that aren't virtual: limits
-// and supervision that would make it safe to stand next to a moving arm aren't there yet.
+// Returns the exit status; throws SetupError only while nothing has moved. Real interfaces need consent
+// (live/hardware_consent.hpp).
 int run_on_interfaces(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper);
 
 }  // namespace proxarm::command_line

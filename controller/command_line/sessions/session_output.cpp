@@ -21,10 +21,10 @@ using controller::CycleRecord;
 using controller::Summary;
 
 constexpr const char* default_plot = "proxarm-run.svg";
-// A force of so many times empty_handle_N is above its band, what the tool rings by included.
+// A force of this many times empty_handle_N is above the band of an empty handle, even while the tool rings.
 constexpr double felt_bands = 4.0;
 
-// Where each clock of the scripts began; empty without a script.
+// Says when each clock of the scripts started; empty without a script.
 std::string clocks_text(const Summary& summary, const RunOptions& options) {
   if (options.faults.empty() && options.changes.empty() && options.orders.empty() && options.enabling.empty())
     return "";
@@ -61,7 +61,7 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
 }
 
 namespace {
-// What of the gears' ringing the stability check, whose arm is rigid, doesn't see.
+// The stability check models a rigid arm, so it doesn't see this ringing of the gears.
 void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
   constexpr double most_modes = 3.0;  // measured: docs/studies.md
   const double bandwidth_Hz = cell.limits.setpoint_bandwidth_Hz;
@@ -76,7 +76,7 @@ void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
 }  // namespace
 
 namespace {
-// What an arm that hasn't six axes does with them where its drives take positions.
+// Says what an arm with more or fewer than six axes does with them, if its drives take positions.
 std::string axes_text(int axes, int dimensions) {
   if (axes == 6) return "";
   const std::string count = std::to_string(axes) + (axes == 1 ? " axis" : " axes");
@@ -92,7 +92,7 @@ void SessionOutput::introduce() const {
   const models::Arm& arm = deriver_.arm();
   const double mode_Hz = arm.first_elastic_frequency_Hz(arm.start_rad());
   if (!session_.impedance()) warn_if_it_chatters(session_.cell, mode_Hz);
-  if (options_.json) return;  // nothing but the summary goes to standard output then
+  if (options_.json) return;  // then only the summary goes to standard output
   const models::ToolSpace reach = models::tool_space(arm);
   const models::TipMass tip = arm.effective_mass_range(arm.start_rad(), reach.dimensions);
   std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
@@ -109,7 +109,7 @@ void SessionOutput::introduce() const {
   std::fflush(stdout);
 }
 
-// On standard error, when it matters.
+// Printed on standard error when it matters.
 void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
   const std::string& brakes = session_.cell.supervision.brake_release;
   const std::string by_hand = brakes.empty() ? "" : "; brakes: " + brakes;
@@ -126,7 +126,7 @@ void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
   }
 }
 
-// On standard error: who asked for it hears only that it was begun.
+// Printed on standard error: the client who asked was told only that the change began.
 void SessionOutput::say_timestep(const CycleRecord& record) {
   if (record.refused_period_ns > 0) {
     std::fprintf(stderr,
@@ -145,7 +145,7 @@ void SessionOutput::say_timestep(const CycleRecord& record) {
   }
 }
 
-// On standard error, while it happens: once for each spell that lasts.
+// Warns on standard error as it happens, once for each lasting spell.
 void SessionOutput::say_oscillation() {
   const controller::Oscillation present = builder_.oscillation();
   if (present.lasts && !told_oscillation_) {
@@ -156,7 +156,7 @@ void SessionOutput::say_oscillation() {
   told_oscillation_ = present.lasts;
 }
 
-// On standard error, when a force that is no longer taken for a hand's is one that somebody could feel.
+// Warns on standard error if a force that no longer counts as a hand's is one that a person could feel.
 void SessionOutput::say_belief(const CycleRecord& record) {
   const bool off = record.has(controller::RecordFlag::hands_off);
   const double force_N = controller::vec3(record.force_W_N).norm();
@@ -183,7 +183,7 @@ void SessionOutput::judge_pose(const CycleRecord& record) {
   say_poses();
 }
 
-// On standard error, when most samples have come late for a while.
+// Warns on standard error once most samples have been late for a quarter of a second.
 void SessionOutput::say_lateness(const CycleRecord& record) const {
   std::fprintf(stderr,
                "proxarm: from %.4g s on the force sensor's samples come a cycle late and are used %.4g ms later: the "
@@ -191,7 +191,7 @@ void SessionOutput::say_lateness(const CycleRecord& record) const {
                1e-9 * static_cast<double>(record.time_ns), 1e-6 * static_cast<double>(record.period_ns));
 }
 
-// On standard error: at the start only the start pose was judged. Who forced an unstable mass knows.
+// Reported on standard error, as only the start pose was judged at the start. A user who forced an unstable mass knows.
 void SessionOutput::say_poses() {
   for (const controller::UnstablePlaces& there : poses_->news()) {
     if (options_.force_unstable) continue;
@@ -211,7 +211,7 @@ CycleRecord SessionOutput::add(const CycleRecord& record) {
 }
 
 void SessionOutput::tell(const CycleRecord& record) {
-  // A hold for a change of the timestep ends by itself; one that doesn't is told of after it.
+  // A hold for a change of the timestep ends by itself. If it doesn't, it is reported once the change is over.
   if (record.phase != controller::Phase::holding || !record.has(controller::RecordFlag::timestep)) {
     if (record.phase != last_phase_) say_how_to_get_free(record.phase);
     last_phase_ = record.phase;
@@ -277,7 +277,7 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
 
 bool SessionOutput::draw_plot(const Summary& summary) {
   if (!plot_) return true;
-  if (plot_->is_empty()) {  // as of a session that was stopped before; whoever stops it knows
+  if (plot_->is_empty()) {  // stopped before rendering; the user knows
     if (!options_.json) std::printf("  plot:                     none; nothing was rendered\n");
     return true;
   }

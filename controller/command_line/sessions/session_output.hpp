@@ -1,4 +1,4 @@
-// What a session leaves: summary, plot, record. Fed with every record, in order, outside of the cycle.
+// Makes a session's summary, plot and record. It gets every record in order, outside the cycle.
 #pragma once
 
 #include <chrono>
@@ -23,21 +23,22 @@ namespace proxarm::command_line {
 
 class SessionOutput {
  public:
-  // Makes the record's folder where one is wanted; throws SetupError. `with_truth`: records carry the simulation's
-  // truth.
+  // Makes the record's folder if wanted; throws SetupError. `with_truth`: records hold the simulation's truth.
   SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth);
 
-  // What the user should know before the arm moves. Whoever reads it may want it to end: signals are watched by then.
+  // Prints what the user should know before the arm moves. Call it once signals are watched, as the user may want to
+  // stop.
   void introduce() const;
-  // Adds what only the scene knows (distances, friction), and passes the record on. Returns it with what was added.
+  // Completes the record with what only the scene gives (distances, friction), and processes it. Returns the completed
+  // record.
   controller::CycleRecord add(const controller::CycleRecord& record);
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
 
-  // Of all that was added and what the cycle found; the caller fills in what only it knows before finish(). `cause`: of
-  // SessionEnd::asked.
+  // Summarises all records and the cycle's results; the caller adds what only it knows before finish(). `cause`
+  // explains SessionEnd::asked.
   [[nodiscard]] controller::Summary summary(const controller::Cycle& cycle, controller::SessionEnd end,
                                             const EndingCause& cause);
-  // Writes files, draws the plot, prints the summary to standard output, has the black box written after a fault.
+  // Writes files, draws the plot, prints the summary on standard output, and after a fault has the black box written.
   // Returns the exit status.
   int finish(controller::Summary summary, BlackBoxKeeper& keeper);
 
@@ -61,11 +62,11 @@ class SessionOutput {
   controller::SignalDeriver deriver_;
   std::unique_ptr<controller::LedPoses> poses_;  // admittance type
   std::optional<controller::Swing> swing_;       // of a tool that is turned
-  std::chrono::steady_clock::duration spent_{};  // on records and their figures
+  std::chrono::steady_clock::duration spent_{};  // on records and figures
   std::int64_t rendered_ns_ = 0;
-  std::int64_t told_period_ns_ = 0;             // that the user knows of
-  bool told_oscillation_ = false;               // of the present spell
-  bool was_off_ = false, told_belief_ = false;  // nobody held the handle in the cycle before; and what that was told of
+  std::int64_t told_period_ns_ = 0;             // the timestep last reported to the user
+  bool told_oscillation_ = false;               // reported for the present spell
+  bool was_off_ = false, told_belief_ = false;  // nobody held the handle in the previous cycle; that was reported
   controller::Phase last_phase_ = controller::Phase::idle;
 };
 

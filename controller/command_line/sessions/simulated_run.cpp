@@ -20,8 +20,8 @@ using controller::Cycle;
 using controller::CycleRecord;
 using SteadyClock = std::chrono::steady_clock;
 
-// Virtual time at the pace of the clock on the wall, for somebody who looks: each cycle waits until it is due. It is
-// never late, so nothing is left out, and what is commanded is the same to the bit as without.
+// Makes virtual time keep pace with the wall clock, for viewers: each cycle waits until it is due. No cycle is skipped,
+// and the setpoints are the same to the bit as without waiting.
 class Spectator {
  public:
   explicit Spectator(bool looks) : looks_(looks) {}
@@ -78,7 +78,7 @@ int SimulatedRun::run_cycles() {
   const SteadyClock::time_point begun = SteadyClock::now();
   controller::LatencyHistogram wake_up;
   Spectator spectator(options_.view && !options_.pace);
-  if (options_.pace == Pace::realtime) network.follow_real_time();  // now: what went before was no cycle's
+  if (options_.pace == Pace::realtime) network.follow_real_time();  // from now on: earlier time belongs to no cycle
   const controller::SessionTally tally =
       loop_.run([this](const CycleRecord& record, const sim::Truth& truth) { drain(record, truth); },
                 controller::session_length(session_, options_),

@@ -12,12 +12,12 @@ namespace proxarm::command_line {
 
 class SimulatedRun {
  public:
-  // Throws SetupError. `arm`: what is simulated, where it is another one than the session takes it for. `session`,
-  // `options` and `keeper` must outlive the run.
+  // Throws SetupError. `arm` is the simulated arm, which may differ from the session's cell. Preconditions: `session`,
+  // `options` and `keeper` outlive the run.
   SimulatedRun(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
                BlackBoxKeeper& keeper);
 
-  // Returns the exit status; throws SetupError while nothing has moved.
+  // Returns the exit status; throws SetupError only while nothing has moved.
   int run();
 
  private:

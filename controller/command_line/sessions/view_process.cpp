@@ -27,14 +27,14 @@ using description::Json;
 using description::SetupError;
 
 constexpr int answer_within_ms = 30'000;  // a mesh without a cache may take a while
-// Where the process finds its descriptors.
+// The descriptors' numbers in the view's process.
 constexpr int memory_there = 3, line_there = 4;
 
 [[noreturn]] void refuse(const std::string& found, const std::string& expected, const std::string& advice = "") {
   throw SetupError({.key = "--view", .found = found, .expected = expected, .advice = advice});
 }
 
-// The process reads the files itself, a second time.
+// The view's process reads the files again.
 std::string readable_twice(const fs::path& file, const char* option) {
   std::error_code error;
   if (!file.empty() && !fs::is_regular_file(file, error)) {
@@ -66,13 +66,13 @@ Json hello_of(const PreparedSession& session, const RunOptions& options, ViewPro
             {"impedance", session.impedance()}}}};
 }
 
-// False where nobody reads any more.
+// Returns false if the reader is gone.
 bool send_line(int line, const Json& value) {
   const std::string text = value.dump() + "\n";
   return send(line, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
 }
 
-// Up to its end; empty where nothing comes in time.
+// Empty if no line comes in time.
 std::string read_line(int line) {
   std::string text;
   for (char letter = 0; letter != '\n'; text += letter) {
@@ -152,7 +152,7 @@ void ViewProcess::greet(const PreparedSession& session, const RunOptions& option
 void ViewProcess::show_end(int exit_status) {
   if (!send_line(line_, {{"ended", "the session is over"}, {"exit_status", exit_status}})) return;
   std::atomic<bool> asked{false};
-  SignalWatch signals([&] { asked.store(true); });  // before it is offered
+  SignalWatch signals([&] { asked.store(true); });  // watched before the message offers Ctrl-C
   std::fprintf(stderr, "proxarm: the session is over; its view stays at %s until Ctrl-C\n", url_.c_str());
   while (!asked.load() && waitpid(child_, nullptr, WNOHANG) == 0) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));

@@ -1,8 +1,8 @@
-// The session's side of the view: starts the process that shows it, tells it what there is to see, and how it ended.
+// The session's side of the view: starts the process that shows the session, and tells it what to show and how the
+// session ended.
 //
-// That process (command_line/view/live_view.hpp) is another program, so nothing of it is in this one's memory. It maps
-// the black box's memory for reading, which the cycle writes anyway: the cycle does nothing for it. Whether it lives or
-// dies changes nothing here.
+// That process (command_line/view/live_view.hpp) is another program, so the session has none of its code in memory. It
+// only reads the black box's memory. If it crashes, the session goes on unchanged.
 #pragma once
 
 #include <cstdint>
@@ -20,19 +20,19 @@ class ViewProcess {
  public:
   enum class Shows : std::uint8_t {
     session,
-    simulated_arm,  // alone: it knows no proxy, and no scene but the one that --scene names
+    simulated_arm,  // no proxy, and no scene unless --scene names one
   };
 
-  // `memory`: descriptor of the black box. Starts the process and prints the URL on standard error. No other thread may
-  // run yet. Throws SetupError where it can't be shown.
+  // Starts the process and prints the URL on standard error. `memory` is the black box's descriptor. Precondition: no
+  // other thread runs yet. Throws SetupError if the session can't be shown.
   ViewProcess(const PreparedSession& session, const RunOptions& options, int memory, Shows shows = Shows::session);
   ViewProcess(const ViewProcess&) = delete;
   ViewProcess& operator=(const ViewProcess&) = delete;
-  ~ViewProcess();  // and what it shows is gone
+  ~ViewProcess();  // ends the view
 
   [[nodiscard]] const ViewPlace& place() const noexcept { return place_; }
 
-  // The session is over: tells whoever looks, and lets them look until a signal comes or the process is gone.
+  // Tells the viewers that the session is over. The view stays until a signal comes or its process ends.
   void show_end(int exit_status);
 
  private:
@@ -46,12 +46,12 @@ class ViewProcess {
   int child_ = -1;
 };
 
-// How far from swinging the session is from now on, for whoever looks. Waits for nobody.
+// Sends the viewers the present margin to instability. Doesn't block.
 void tell_margin(const ViewPlace& place, const controller::PassedPoses::Place& judged);
 
-// The socket that --view-control has where there is no --control: of this session alone.
+// The socket of --view-control without --control, for this session only.
 std::filesystem::path view_control_path();
-// And what is left of it afterwards.
+// Removes what is left of that socket.
 void remove_view_control();
 
 }  // namespace proxarm::command_line

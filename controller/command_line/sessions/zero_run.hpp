@@ -1,4 +1,4 @@
-// The zero of the force sensor: what a session holds its tare against, and what is kept of it afterwards.
+// The zero of the force sensor: a session compares its tare with it, and keeps the new one afterwards.
 #pragma once
 
 #include <string>
@@ -10,15 +10,15 @@
 
 namespace proxarm::command_line {
 
-// Gives the session the zero that is kept beside its cell. Where none is, a simulated sensor has its own, and a real
-// one is expected to have none.
+// Gives the session the zero kept beside its cell. Without one, a simulated sensor keeps the zero that it has, and a
+// real sensor's is taken as 0.
 void know_zero(PreparedSession& session, const RunOptions& options);
 
-// As this cycle has tared and followed it.
+// Returns the zero that this cycle has tared and followed.
 ZeroFile zero_of(const PreparedSession& session, const controller::Cycle& cycle, bool real_arm);
 
-// After a session on a real arm that found nothing wrong: its zero, as it was followed, is kept. With --accept-force it
-// isn't, since a hand may be in it.
+// Keeps the zero after a session without a fault on a real arm. With --accept-force it isn't kept, since it may contain
+// a hand's force.
 void keep_zero(const PreparedSession& session, const RunOptions& options, const std::vector<std::string>& interfaces,
                const controller::Cycle& cycle);
 

@@ -23,7 +23,7 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   if (turns) {
     options.inertia_kg_m2 = setup.inertia_kg_m2;
     options.hand = shipped_file("sim/hands/wobble.yaml");
-    // A wrist swings at 3 Hz on such a tool, above the band in which hands move by will, and this one means to.
+    // With such a tool the wrist oscillates at 3 Hz, above the band of voluntary hand motion; here the hand means to.
     options.passivity = controller::Passivity::off;
   }
   options.scene = shipped_file(setup.wall ? "scenes/frictionless_wall.yaml" : "scenes/free.yaml");
@@ -34,12 +34,12 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   session.hand.waypoints.clear();
   session.hand.multisine.clear();
   if (setup.wall) {
-    // Leans on the wall, which is 0.2 m away, by 30 mm.
+    // Leans 30 mm into the wall, which is 0.2 m away.
     session.hand.waypoints = {{0.0, {0.0, 0.0, 0.0}}, {2.0, {0.23, 0.0, 0.0}}};
   }
   const models::Vec3 along = models::Vec3::Unit(setup.axis);
   for (std::size_t i = 0; i < setup.sines.size(); ++i) {
-    // By turns with and against each other: at first the hand rests where the tool is.
+    // The sines alternate in sign, so that the hand starts about where the tool is.
     session.hand.multisine.push_back({.frequency_Hz = setup.sines[i].frequency_Hz,
                                       .amplitude_m = turns ? 0.0 : setup.sines[i].amplitude,
                                       .amplitude_rad = turns ? setup.sines[i].amplitude : 0.0,

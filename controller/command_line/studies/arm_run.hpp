@@ -1,4 +1,4 @@
-// Sessions of the default cell for the studies: in-process, in virtual time, nothing printed and nothing drawn.
+// Runs sessions of the default cell for the studies: in-process, in virtual time, without output.
 #pragma once
 
 #include "controller/studies/fidelity.hpp"
@@ -6,7 +6,7 @@
 
 namespace proxarm::command_line {
 
-// Throws SetupError. Several threads may call it.
+// Both throw SetupError and may be called by several threads.
 std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup);
 studies::CycleCounts count_cycles(const studies::CycleSetup& setup);
 

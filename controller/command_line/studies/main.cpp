@@ -1,5 +1,4 @@
-// The program behind `proxarm study`, which becomes it. Apart, because measuring how good proxarm is takes as long to
-// compile as a sixth of proxarm.
+// The program that `proxarm study` becomes. It is separate because the studies take a sixth of proxarm's compile time.
 //
 // Exit status: 0 fine, 1 an invariant was violated, 2 set-up mistake.
 #include <CLI/CLI.hpp>

@@ -1,4 +1,4 @@
-// `proxarm study`; returns the exit status and throws SetupError.
+// `proxarm study`: its options, and the function that runs it.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct StudyOptions {
   std::string command_line;  // for the record
 };
 
-// What a study measures and writes, for its help; empty: there is none of that name.
+// Returns what a study measures and writes, for its help; empty if there is no study of that name.
 std::string study_description(const std::string& name);
 int study_command(const StudyOptions& options);
 

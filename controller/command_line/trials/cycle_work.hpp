@@ -1,4 +1,4 @@
-// What the cycles of a session compute around 𝒢, and what they can leave out, in counts.
+// Counts what a session's cycles compute beyond 𝒢, and what they can skip.
 #pragma once
 
 #include <string>
@@ -8,10 +8,9 @@
 
 namespace proxarm::command_line {
 
-// Of a session of the simulated arm. Throws SetupError where it can't begin.
+// Counts over a session on the simulated arm. Throws SetupError if the session can't begin.
 controller::MotionWork count_work(const PreparedSession& session);
 
-// The same in words, a line for each stage.
 std::string work_text(const PreparedSession& session, const controller::MotionWork& work);
 
 }  // namespace proxarm::command_line

@@ -10,7 +10,7 @@ using controller::HandModel;
 using controller::LoopModel;
 using controller::PoseLoopModel;
 
-// The hand in rotation, as much stiffer and heavier as it is in place.
+// Returns the hand in rotation, made stiffer and heavier by the same factors as `other_place` against `place`.
 HandModel likewise(const HandModel& turning, const HandModel& place, const HandModel& other_place) {
   HandModel other = turning;
   other.stiffness_N_per_m *= other_place.stiffness_N_per_m / place.stiffness_N_per_m;
@@ -18,7 +18,7 @@ HandModel likewise(const HandModel& turning, const HandModel& place, const HandM
   return other;
 }
 
-// `least`, or what the worst of the poses asks for beyond it.
+// Returns the smallest inertia of at least `least_kg_m2` that is stable in all poses.
 std::optional<double> smallest_in(const PreparedSession& session, const PoseLoopModel& model,
                                   const std::vector<models::JointVector>& poses_rad, double least_kg_m2) {
   const models::Arm arm(session.cell);

@@ -1,5 +1,5 @@
-// The inertia that `tune` advises for a tool that is led and turned at once: stable with margins by the pose loop's
-// eigenvalues, in all poses that the hand leads to.
+// The inertia that `tune` advises for a tool that is moved and turned at once. By the eigenvalues of the pose loop it
+// is stable with margins in all poses that the hand leads to.
 #pragma once
 
 #include <optional>
@@ -8,10 +8,11 @@
 
 namespace proxarm::command_line {
 
-// Felt, what hangs behind the sensor included; absent: none is stable with the session's mass.
+// Felt inertias (kg m²), load behind the sensor included; absent: no inertia is stable with the session's mass.
 struct SmallestInertias {
   std::optional<double> at_start, everywhere;
-  std::optional<double> with_margins;  // everywhere, with those of controller::with_margins in place and in rotation
+  std::optional<double> with_margins;  // as `everywhere`, with the margins of controller::with_margins for the hand's
+                                       // translation and rotation
 };
 // Precondition: the session has a turned_model().
 SmallestInertias smallest_inertias(const PreparedSession& session);

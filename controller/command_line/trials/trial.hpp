@@ -1,5 +1,4 @@
-// Is a mass, or an inertia, as steady on the simulated arm as the stability check says? What `tune` asks before it
-// advises one.
+// Tries a mass or an inertia on the simulated arm, to confirm the stability check before `tune` advises the value.
 #pragma once
 
 #include <optional>
@@ -12,24 +11,23 @@ namespace proxarm::command_line {
 
 struct Trial {
   controller::Oscillation oscillation;
-  std::string fault;  // that ended it; empty: none
+  std::string fault;  // the fault that ended the trial; empty: none
   [[nodiscard]] bool steady() const noexcept { return !oscillation.lasts && fault.empty(); }
 };
 
-// The session with nothing sent ahead and nothing damped, and with a hand so many times as stiff and as heavy. Throws
-// SetupError where it can't begin.
+// Runs the session without lookahead and without added damping. The hand's stiffness and mass are multiplied by
+// hand_factor. Throws SetupError if the session can't begin.
 Trial try_out(PreparedSession session, double hand_factor);
 
 struct TriedAdvice {
-  std::optional<double> steady;  // the first that is; none: of six none was
+  std::optional<double> steady;  // the first steady value; absent: none of the six tried was steady
   std::string text;
 };
-// What comes of a felt mass, or a felt inertia, on the simulated arm. Larger ones are tried where it isn't steady, a
-// quarter more each time.
+// Tries a felt mass or a felt inertia on the simulated arm. While it isn't steady, tries values that grow by a quarter.
 TriedAdvice tried_mass(const PreparedSession& session, double mass_kg);
 TriedAdvice tried_inertia(const PreparedSession& session, double inertia_kg_m2);
 
-// Two digits, not less.
+// Rounds up to two significant digits.
 double rounded_up(double value);
 
 }  // namespace proxarm::command_line

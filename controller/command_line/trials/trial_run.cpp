@@ -16,13 +16,13 @@ namespace {
 
 using assessment::Stop;
 
-// The sensor is tared, and the hand's force is let in, before the hand leads: 0.2 s each by default.
+// The sensor is tared and the hand's force is let in before the hand leads: 0.2 s each by default.
 constexpr double lead_from_s = 0.3;
-// It leads for so long, on a minimum-jerk path whose greatest speed, 15/8 of its mean, is 1.2 times what the tool may
-// have: so the tool runs at its limit in the middle of the way.
+// The hand leads for lead_s on a minimum-jerk path. The path's greatest speed is 15/8 of its mean and 1.2 times the
+// tool's speed limit, so the tool runs at its limit in the middle.
 constexpr double lead_s = 0.94, lead_over_limit = 1.2, peak_of_minimum_jerk = 15.0 / 8.0;
-// What is seen of a trial after the stop, and after the tool has met a body: four times as long as a contact counts as
-// short.
+// How long a trial is observed after the stop, and after the tool has met a body: four times the duration up to which a
+// contact counts as short.
 constexpr double after_stop_s = 1.0, after_contact_s = 4.0 * assessment::quasi_static_from_s;
 
 double ramp_s(const PreparedSession& session) {
@@ -40,7 +40,8 @@ description::HandDescription hand_of(const PreparedSession& session, const asses
   const models::Vec3 way = speed_m_per_s * lead_s / peak_of_minimum_jerk * trial.direction_W;
   const double from_s = ramp_s(session);
   hand.waypoints = {{from_s, {0.0, 0.0, 0.0}}, {from_s + lead_s, {way.x(), way.y(), way.z()}}};
-  // Who is startled by a stop lets go, evenly over a tenth of a second: what is measured is the arm's own way.
+  // A person who is startled by a stop lets go, evenly over a tenth of a second. So only the arm's own motion is
+  // measured.
   if (trial.stop != Stop::none) hand.grips = {{trial.at_s, 0.0, 0.0}};
   return hand;
 }
@@ -63,7 +64,7 @@ std::string end_of(const controller::Supervisor& supervisor) {
   return supervisor.held_for().fault == Fault::none ? "" : controller::fault_name(supervisor.held_for().fault);
 }
 
-// The far end with what the trial puts into it, and what is seen of it on the hand's clock.
+// The simulated arm of a trial, with the trial's body and stop. Observed times count from the hand's start.
 class TrialArm {
  public:
   TrialArm(const PreparedSession& session, const assessment::Trial& trial)
@@ -100,11 +101,11 @@ class TrialArm {
                                          }};
     controller::run_session(cycle, network_, {seen_s_ + 1.0}, hooks);
     result_.end = end_.empty() ? end_of(cycle.supervisor()) : end_;
-    // A session that a fault has ended before all was seen.
+    // The observation lasts to its end even if a fault has ended the session.
     const sim::Truth truth = far_end_.truth();
     const auto rest_ns = static_cast<std::int64_t>(1e9 * std::max(0.0, seen_s_ - since_hand_s(truth)));
     network_.sleep_until(network_.now_ns() + rest_ns);
-    static_cast<void>(far_end_.truth());  // the physics come up to that time
+    static_cast<void>(far_end_.truth());  // advances the physics to that time
     return std::move(result_);
   }
 
@@ -113,7 +114,7 @@ class TrialArm {
     return 1e-9 * static_cast<double>(truth.time_ns - truth.hand_start_ns);
   }
 
-  // Before each cycle: the stop, and the end of what is seen.
+  // Called before each cycle: begins the stop, and ends the session when the observation ends.
   void intervene(controller::Cycle& cycle) {
     const sim::Truth truth = far_end_.truth();
     if (!truth.hand_started) return;

@@ -1,4 +1,4 @@
-// Trials of an assessment: sessions of a cell in-process and in virtual time, nothing printed and nothing drawn.
+// Runs the trials of an assessment: sessions of a cell in-process and in virtual time, without output.
 #pragma once
 
 #include "controller/assessment/assessment.hpp"
@@ -6,8 +6,8 @@
 
 namespace proxarm::command_line {
 
-// One trial of a session that is prepared and stable. Its hand grips as its file says (the tightest), but goes where
-// the trial says. Throws SetupError where the session can't begin.
+// Runs one trial. Precondition: the session is prepared and stable. The hand grips as its file says (the tightest
+// grip), but moves as the trial says. Throws SetupError if the session can't begin.
 assessment::TrialResult run_trial(const PreparedSession& session, const assessment::Trial& trial);
 
 }  // namespace proxarm::command_line

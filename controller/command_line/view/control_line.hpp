@@ -1,5 +1,4 @@
-// The way from the page to a session: its control socket, as `proxarm set` uses it. Answers come in the server's
-// thread.
+// Lets the page send lines to a session's control socket, as `proxarm set` does. Answers come in the server's thread.
 #pragma once
 
 #include <boost/asio/executor_work_guard.hpp>
@@ -15,15 +14,15 @@ class ControlLine {
  public:
   using Answered = std::function<void(const std::string& answer)>;
 
-  // `socket` empty: nothing may be asked. `server` must outlive it.
+  // `socket` empty: nothing may be asked. Precondition: `server` outlives this object.
   ControlLine(std::filesystem::path socket, boost::asio::io_context& server);
   ControlLine(const ControlLine&) = delete;
   ControlLine& operator=(const ControlLine&) = delete;
   ~ControlLine();
 
   [[nodiscard]] bool open() const noexcept { return !socket_.empty(); }
-  // One after the other, in a thread of its own, since a session may take its time; `answered` gets "ok: …" or
-  // "refused: …". Of more than eight that wait the last is refused.
+  // Asks one line after the other in a separate thread, since a session may take time to answer. `answered` gets "ok:
+  // …" or "refused: …". While eight lines wait, further ones are refused.
   void ask(std::string line, Answered answered);
 
  private:
@@ -31,7 +30,7 @@ class ControlLine {
   boost::asio::io_context& server_;
   boost::asio::io_context asking_{1};
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
-  std::size_t waiting_ = 0;  // the server's thread's
+  std::size_t waiting_ = 0;  // used by the server's thread only
   std::thread thread_;
 };
 

@@ -33,7 +33,7 @@ using nlohmann::json;
 constexpr int answer_within_ms = 60'000;
 constexpr auto patience = std::chrono::seconds(60);
 
-// On the PATH, by the names that it has.
+// Finds the browser on the PATH, by one of its usual names.
 fs::path find_browser() {
   const char* const path = std::getenv("PATH");
   std::istringstream folders(path != nullptr ? path : "/usr/bin");
@@ -78,7 +78,7 @@ HeadlessBrowser::HeadlessBrowser(PictureSize size, bool dark) {
   attach(size, dark);
 }
 
-// Descriptors 3 and 4 are where --remote-debugging-pipe reads and writes.
+// --remote-debugging-pipe reads from descriptor 3 and writes to 4.
 void HeadlessBrowser::start(const fs::path& program) {
   std::vector<std::string> words{program.string(),
                                  "--headless=new",
@@ -95,7 +95,7 @@ void HeadlessBrowser::start(const fs::path& program) {
                                  "--enable-unsafe-swiftshader",
                                  "--user-data-dir=" + profile_.string(),
                                  "about:blank"};
-  if (geteuid() == 0) words.insert(words.begin() + 1, "--no-sandbox");  // its sandbox needs another user than root
+  if (geteuid() == 0) words.insert(words.begin() + 1, "--no-sandbox");  // the browser's sandbox doesn't work for root
   std::array<int, 2> to{}, from{};
   if (pipe2(to.data(), O_CLOEXEC) != 0 || pipe2(from.data(), O_CLOEXEC) != 0) {
     throw SetupError({.message = std::string("no pipe to the browser: ") + std::strerror(errno)});
@@ -105,7 +105,7 @@ void HeadlessBrowser::start(const fs::path& program) {
   for (const int end : {to[0], from[1]}) close(end);
   to_ = to[1];
   from_ = from[0];
-  // A browser that ends at once is a mistake to be told; writing to it would end this program first.
+  // If the browser ends at once, that is reported as an error; without this, writing to it would end the program first.
   (void)std::signal(SIGPIPE, SIG_IGN);
   if (child.error != 0) throw SetupError({.file = program.string(), .message = std::strerror(child.error)});
 }

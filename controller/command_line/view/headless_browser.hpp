@@ -1,5 +1,5 @@
-// A Chromium without a window, led through a pipe by the DevTools protocol: opens an address, runs JavaScript there,
-// and takes pictures.
+// Drives a Chromium without a window through a pipe, by the DevTools protocol: opens an address, runs JavaScript, takes
+// pictures.
 #pragma once
 
 #include <filesystem>
@@ -14,17 +14,17 @@ struct PictureSize {
 
 class HeadlessBrowser {
  public:
-  // Throws SetupError where there is none, or where it doesn't start.
+  // Throws SetupError if there is no browser or it doesn't start.
   explicit HeadlessBrowser(PictureSize size, bool dark);
   HeadlessBrowser(const HeadlessBrowser&) = delete;
   HeadlessBrowser& operator=(const HeadlessBrowser&) = delete;
   ~HeadlessBrowser();
 
   void open(const std::string& url);
-  // Until this JavaScript is true. Throws SetupError after half a minute.
+  // Waits until this JavaScript expression is true. Throws SetupError after a minute.
   void wait_for(const std::string& condition);
   void run(const std::string& script);
-  // A PNG. Throws SetupError where the file can't be written.
+  // Saves a PNG. Throws SetupError if the file can't be written.
   void save_picture(const std::filesystem::path& file);
 
  private:

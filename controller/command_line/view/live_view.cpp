@@ -103,7 +103,8 @@ class LiveView {
   }
 
  private:
-  // Where processors are scarce, the session goes first, once somebody who waited for a picture has one.
+  // Lowers this process's priority once a waiting viewer has the first picture: if processors are scarce, the session
+  // goes first.
   void step_back() {
     if (!std::exchange(stepped_back_, true)) (void)setpriority(PRIO_PROCESS, 0, 5);
   }
@@ -134,13 +135,13 @@ class LiveView {
           tell_spectrum();
         }
       }
-      // A machine that is too slow for 60 a second has fewer, not a backlog.
+      // A machine too slow for 60 moments a second shows fewer, without a backlog.
       timer_.expires_at(std::max(timer_.expiry() + between_moments, std::chrono::steady_clock::now()));
       show();
     });
   }
 
-  // A transform of a second takes some milliseconds, and nobody reads bars that change faster.
+  // A transform of a second takes some milliseconds, and nobody can read bars that change faster.
   void tell_spectrum() {
     const auto now = std::chrono::steady_clock::now();
     if (now < next_spectrum_ || stage_.options().arm_alone) return;
@@ -155,7 +156,7 @@ class LiveView {
     page_.say(text_of({{"status", status_}}));
   }
 
-  // The session's later lines, until it falls silent.
+  // Reads the session's later lines until the socket closes.
   void listen() {
     boost::asio::async_read_until(session_, lines_, '\n', [this](const error_code& error, std::size_t) {
       if (error) {
@@ -208,7 +209,7 @@ void reply(stream_protocol::socket& session, const json& answer) {
 }  // namespace
 
 int live_view(int memory, int session) {
-  ignore_ending_signals();  // Ctrl-C is the session's: it says when this is over
+  ignore_ending_signals();  // Ctrl-C is for the session, which then ends this process
   boost::asio::io_context context{1};
   stream_protocol::socket line(context, stream_protocol(), session);
   std::optional<LiveView> shown;

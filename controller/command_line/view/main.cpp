@@ -1,4 +1,4 @@
-// The program behind `--view` and `proxarm view`: apart, so that nothing of a web server is in the memory of a session.
+// The program behind `--view` and `proxarm view`. It is separate so that a session has no web server in its memory.
 //
 // Exit status: 0 fine, 2 set-up mistake.
 #include <CLI/CLI.hpp>
@@ -90,7 +90,7 @@ void add_options(CLI::App& app, command_line::ViewOptions& options) {
 }
 
 int run(const std::vector<std::string>& words, char** argv) {
-  // As a session starts it (sessions/view_process.cpp).
+  // Started by a session (sessions/view_process.cpp).
   if (words.size() == 3 && words[0] == "--live") {
     return command_line::live_view(std::atoi(words[1].c_str()), std::atoi(words[2].c_str()));
   }

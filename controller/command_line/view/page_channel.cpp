@@ -24,7 +24,7 @@ void PageChannel::closed(const SocketPtr& socket) { std::erase(sockets_, socket)
 
 std::string PageChannel::choose(const std::vector<std::string>& /*offered*/) const { return {}; }
 
-// Whoever sends what the page doesn't is no page.
+// Drops a client that sends messages which the page doesn't send.
 void PageChannel::received(const SocketPtr& socket, std::string_view message, bool binary) {
   const json said = binary ? json() : json::parse(message, nullptr, false);
   if (wanted_ && said.is_object() && wanted_(*socket, said)) return;
@@ -39,7 +39,7 @@ void PageChannel::received(const SocketPtr& socket, std::string_view message, bo
 }
 
 void PageChannel::show(const view::Bytes& moment) {
-  const auto all = sockets_;  // one may go away meanwhile
+  const auto all = sockets_;  // a socket may go away meanwhile
   for (const SocketPtr& socket : all) socket->show(moment);
 }
 

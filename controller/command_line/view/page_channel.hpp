@@ -1,10 +1,10 @@
-// What the page and the process say to each other over its WebSocket.
+// The messages between the page and the process over the page's WebSocket.
 //
-// To the page: text, JSON with one key: "stage" (view/stage/stage.hpp, and "mode" and "control"), "settings"
-// where they have changed (view/stage/present_settings.hpp), "status", "answer", and of a running session "spectrum"
-// four times a second (vibration.hpp);
-// binary, moments and histories (view/stage/moment.hpp). From the page: JSON {"ask": LINE, "id": N}, a line for the
-// session's control socket, answered by {"answer": {"id": N, "text": …}}; of a record what play_view.hpp says.
+// To the page, as text: JSON with one key. "stage" (view/stage/stage.hpp, with "mode" and "control"), "settings" after
+// a change (view/stage/present_settings.hpp), "status", "answer", and in a running session "spectrum" four times a
+// second (vibration.hpp). To the page, binary: moments and histories (view/stage/moment.hpp). From the page: JSON
+// {"ask": LINE, "id": N}, a line for the session's control socket, answered by {"answer": {"id": N, "text": …}}; with a
+// record, also the requests in play_view.hpp.
 #pragma once
 
 #include <functional>
@@ -19,9 +19,9 @@ namespace proxarm::command_line {
 
 class PageChannel final : public view::Channel {
  public:
-  // `welcome` gives what a page that opens is told first.
+  // `welcome` sends the first messages to a page that opens.
   using Welcome = std::function<void(view::Socket& socket)>;
-  // Takes what isn't for the control socket. False: no page says that.
+  // Takes messages that aren't for the control socket. False: not a message of the page.
   using Wanted = std::function<bool(view::Socket& socket, const nlohmann::json& said)>;
 
   PageChannel(ControlLine& control, Welcome welcome, Wanted wanted = {});
@@ -42,7 +42,7 @@ class PageChannel final : public view::Channel {
   std::vector<view::SocketPtr> sockets_;
 };
 
-// A message of JSON.
+// Encodes a message of JSON.
 view::Bytes text_of(const nlohmann::json& value);
 
 }  // namespace proxarm::command_line

@@ -1,4 +1,4 @@
-// The files of the page: ours and three.js, read once, and the meshes of what it shows.
+// The files of the page: its own and three.js, read once, and the meshes of what it shows.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace proxarm::command_line {
 
-// Throws SetupError where something is missing.
+// Throws SetupError if a file is missing.
 view::Assets page_files();
 
-// A mesh by the path that Stage::describe() gives it; null where there is none.
+// Returns a mesh by its path in Stage::describe(); null if there is none.
 view::AssetPtr mesh_file(const view::Stage& stage, const std::string& path);
 
 }  // namespace proxarm::command_line

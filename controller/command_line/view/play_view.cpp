@@ -60,7 +60,7 @@ class PlayView {
 
   [[nodiscard]] std::string url() const { return server_.url(); }
 
-  // The cycle that is due at this time, or the last one before it.
+  // Returns the cycle that is due at this time, or the last one before.
   [[nodiscard]] std::size_t index_at(double time_s) const {
     std::size_t low = 0, high = session_.size() - 1;
     while (low < high) {
@@ -91,7 +91,7 @@ class PlayView {
     show(socket, session_.opening());
   }
 
-  // How far from swinging it was, place by place, as the session's summary has it; none in a black box.
+  // The margins to instability at the passed places, from the session's summary; empty for a black box.
   static json margins_of(const fs::path& folder) {
     json margins = json::array();
     std::ifstream in(folder / "summary.json");
@@ -168,7 +168,7 @@ class PlayView {
 
 namespace {
 
-// "a.png", or of several "a-01.png" …
+// "a.png", or for several pictures "a-01.png" and so on.
 fs::path picture_name(const ViewOptions& options, std::size_t index) {
   if (options.snapshots_s.size() == 1) return options.out;
   std::array<char, 24> number{};
@@ -177,7 +177,7 @@ fs::path picture_name(const ViewOptions& options, std::size_t index) {
   return name.replace_filename(options.out.stem().string() + number.data() + options.out.extension().string());
 }
 
-// The page itself, drawn in a browser without a window while it is served here.
+// Serves the page and draws it in a browser without a window.
 void take_pictures(const PlayView& shown, const ViewOptions& options) {
   HeadlessBrowser browser(options.size, options.dark);
   browser.open(shown.url());

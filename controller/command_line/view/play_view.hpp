@@ -1,6 +1,6 @@
-// `proxarm view DIR`: plays a session that was recorded, or a black box, until Ctrl-C.
+// `proxarm view DIR`: plays a recorded session or a black box until Ctrl-C.
 //
-// Every page has a place in the record of its own, and asks for what it shows:
+// Every page has its own place in the record, and requests what it shows:
 //   {"at": INDEX}             the moment of that cycle
 //   {"frames": INDEX}         {"frames": {"at": INDEX, "list": [{bus, id, bytes, from, words}, …]}}
 //   {"spectrum": INDEX}       {"spectrum": {"at": INDEX, …}}: the handle's vibration of the second before

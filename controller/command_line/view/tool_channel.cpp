@@ -27,7 +27,7 @@ constexpr std::array<Parameter, 3> parameters{{{"mass", "kg"}, {"damping", "Ns/m
 // Channels are numbered from 1, in the order of the topics.
 std::uint32_t channel_of(Topic topic) { return static_cast<std::uint32_t>(topic) + 1; }
 
-// What the arm alone has nothing to say of.
+// Topics that need a controller: a simulated arm alone doesn't have them.
 bool is_of_controller(Topic topic) {
   return topic == Topic::proxy || topic == Topic::contact || topic == Topic::session || topic == Topic::contacts ||
          topic == Topic::contact_arrows;
@@ -118,7 +118,7 @@ void ToolChannel::received(const SocketPtr& socket, std::string_view message, bo
   if (!said.is_object() || !said.contains("op") || !said["op"].is_string() || !obey(*client, said)) socket->drop();
 }
 
-// False: that isn't of the protocol, or not of what this server said it can.
+// Returns false if the message isn't of the protocol or uses a capability that this server doesn't offer.
 bool ToolChannel::obey(Client& client, const json& said) {
   const auto op = said["op"].get<std::string>();
   const auto list = [&](const char* name) {
@@ -205,7 +205,7 @@ void ToolChannel::set_parameter(const SocketPtr& socket, const std::string& name
                  const auto client = std::find_if(clients_.begin(), clients_.end(),
                                                   [&](const Client& c) { return c.socket == socket; });
                  if (client == clients_.end()) return;
-                 // What is taken holds from one of the next cycles on.
+                 // An accepted value takes effect in one of the next cycles.
                  const bool taken = answer.compare(0, 4, "ok: ") == 0;
                  if (!taken) warn(*socket, answer);
                  if (!id.empty()) send_values(*client, {{name, taken ? value : value_of(name)}}, id);
@@ -228,13 +228,13 @@ void ToolChannel::show(const view::Moment& given) {
   }
   if (clients_.empty()) return;
   tell_changes();
-  // Tools think in the machine's time.
+  // Tools expect the machine's time.
   view::Moment moment = given;
   moment.record.time_ns += clock_ns_;
   stage_.place(moment.record, moment.rendered_s, links_, objects_);
   std::map<Topic, std::string> texts;
   for (Client& client : clients_) {
-    if (!client.socket->idle()) continue;  // it gets a later one
+    if (!client.socket->idle()) continue;  // it gets a later moment
     for (const auto& [subscription, topic] : client.subscriptions) {
       if (topic == Topic::scene) {
         if (client.has_scene && same(client.drawn, objects_)) continue;

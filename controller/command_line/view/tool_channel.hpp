@@ -1,10 +1,10 @@
-// Speaks the WebSocket protocol of Foxglove and Lichtblick, under both of its names: foxglove.websocket.v1 and, since
-// it was renamed, foxglove.sdk.v1.
+// Speaks the WebSocket protocol of Foxglove and Lichtblick under both of its names: foxglove.websocket.v1 and, since
+// its renaming, foxglove.sdk.v1.
 //
-// Text is JSON with "op": serverInfo and advertise when a client has come, subscribe, unsubscribe, getParameters,
-// setParameters and (un)subscribeParameterUpdates from it. Binary is a message: 01h, the subscription's number (u32),
-// the time (u64, ns), and the message's text. Parameters are mass, damping and spring; setting one is asking the
-// session's control socket for it.
+// Text messages are JSON with "op": to a new client serverInfo and advertise; from the client subscribe, unsubscribe,
+// getParameters, setParameters and (un)subscribeParameterUpdates. Binary messages are 01h, the subscription's number
+// (u32), the time (u64, ns), and the text. The parameters are mass, damping and spring; setting one sends it to the
+// session's control socket.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ namespace proxarm::command_line {
 
 class ToolChannel final : public view::Channel {
  public:
-  // All must outlive it.
+  // Precondition: all arguments outlive this object.
   ToolChannel(const view::Stage& stage, const view::PresentSettings& settings, ControlLine& control);
 
   void opened(const view::SocketPtr& socket) override;
@@ -31,15 +31,15 @@ class ToolChannel final : public view::Channel {
   void closed(const view::SocketPtr& socket) override;
   [[nodiscard]] std::string choose(const std::vector<std::string>& offered) const override;
 
-  // To all that have subscribed and have taken what they were sent before.
+  // Sends to all clients that have subscribed and have taken the previous messages.
   void show(const view::Moment& moment);
 
  private:
   struct Client {
     view::SocketPtr socket;
     std::map<std::uint32_t, view::Topic> subscriptions;
-    std::set<std::string> watched;    // parameters whose changes it is told
-    std::vector<models::Pose> drawn;  // where objects were when it was sent the scene
+    std::set<std::string> watched;    // parameters whose changes the client gets
+    std::vector<models::Pose> drawn;  // the objects' poses in the last scene sent
     bool has_scene = false;
   };
   bool obey(Client& client, const nlohmann::json& said);
@@ -55,10 +55,10 @@ class ToolChannel final : public view::Channel {
   const view::PresentSettings& settings_;
   ControlLine& control_;
   view::SessionMessages messages_;
-  std::string session_id_;  // another for each session, by which tools know that one has begun anew
+  std::string session_id_;  // differs for each session, so that tools recognize a new one
   std::vector<Client> clients_;
-  std::array<double, 3> told_{};  // of the parameters, to those who watch them
-  std::int64_t clock_ns_ = 0;     // of the machine, at the session's first cycle
+  std::array<double, 3> told_{};  // parameter values last sent to watching clients
+  std::int64_t clock_ns_ = 0;     // the machine's time minus the session's
   std::vector<models::Pose> links_, objects_;
 };
 

@@ -1,4 +1,4 @@
-// The handle's vibration beside what a hand notices, as the page is told it.
+// Compares the handle's vibration with what a hand notices, as JSON for the page.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -9,14 +9,14 @@
 
 namespace proxarm::command_line {
 
-// That of models/thresholds/hands.yaml. Throws SetupError.
+// Returns the threshold of models/thresholds/hands.yaml. Throws SetupError.
 assessment::VibrationThreshold vibration_threshold();
 
-// {"source": TEXT, "points": [[Hz, µm], …]}, told once.
+// {"source": TEXT, "points": [[Hz, µm], …]}, sent once.
 nlohmann::json threshold_json(const assessment::VibrationThreshold& threshold);
 
-// {"of": "steel" or "encoders", "bands": [{centre_Hz, amplitude_um, frequency_Hz, threshold_um}, …]}; of a band beyond
-// the threshold's points `threshold_um` is null.
+// {"of": "steel" or "encoders", "bands": [{centre_Hz, amplitude_um, frequency_Hz, threshold_um}, …]}; `threshold_um` is
+// null for a band outside the threshold's points.
 nlohmann::json spectrum_json(const std::vector<controller::HandleSpectrum::Band>& bands, bool of_truth,
                              const assessment::VibrationThreshold& threshold);
 

@@ -1,4 +1,4 @@
-// What `proxarm view` was asked to do.
+// The options of `proxarm view`.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,11 @@ namespace proxarm::command_line {
 
 struct ViewOptions {
   std::filesystem::path folder;  // of a record or a black box
-  std::uint16_t port = 0;        // 0: any that is free
+  std::uint16_t port = 0;        // 0: any free port
 
-  // Pictures instead of a page that waits: of these times, in seconds of the record.
+  // Pictures at these times of the record (s), instead of serving the page.
   std::vector<double> snapshots_s;
-  std::filesystem::path out;  // of several with a number before the dot
+  std::filesystem::path out;  // several pictures get a number before the dot
   PictureSize size;
   bool dark = false;
   std::string look = "overview";

@@ -1,4 +1,4 @@
-// Friction and rotor inertia of one joint from its motor's torque, line by line: equation (1) of joint_fit.hpp.
+// Fits friction and rotor inertia of one joint to its motor's torque, line by line: equation (1) of joint_fit.hpp.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,7 @@ struct FrictionFit {
   Eigen::Vector3d value = Eigen::Vector3d::Zero(), deviation = Eigen::Vector3d::Zero();
 };
 
-// Precondition: the torque was read. `gears` matter for the torque that the links take in the fast motion.
+// Precondition: the torque was read. `gears` determine the links' share of the torque in the fast motion.
 FrictionFit fit_friction(const models::Arm& arm, const LinkResponse& response, const Gears& gears,
                          const FrictionInputs& inputs);
 

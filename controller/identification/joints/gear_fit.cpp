@@ -14,12 +14,12 @@ namespace {
 using Vector = Eigen::VectorXd;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr double loosely = 1.5, delay_deviation_s = 2e-3;  // the former of ln k and ln d
+constexpr double loosely = 1.5, delay_deviation_s = 2e-3;  // the first for ln k and ln d
 constexpr int sweeps = 3, places = 33, damping_places = 9, most_steps = 60;
-// What the model leaves over is alike in neighbouring lines: so many of them tell as much as one.
+// The model's residuals are correlated over this many neighbouring lines, which count as one.
 constexpr double alike = 4.0;
-// A gear is shown where no other explains the lines nearly as well; those beyond three deviations, and this, are
-// others.
+// A gear is identifiable if no other gear explains the lines nearly as well. Other gears differ by more than three
+// deviations and by more than this.
 constexpr double surely = 30.0, least_apart = 0.1;
 const double searched = std::log(3.0);
 
@@ -44,7 +44,7 @@ class Problem {
     const std::complex<double> sensor = std::exp(p[2 * joints_ + 1] - i * line.omega * p[2 * joints_]) * low_pass;
     return sensor * response_.reading(line.omega, response_.links(gears(p), line.omega, line.motors));
   }
-  // Differences in standard deviations: twelve for each line, then what is expected of the unknowns.
+  // Differences in standard deviations: twelve for each line, then those of the unknowns' expectations.
   [[nodiscard]] Vector differences(const Vector& p) const {
     Vector r(12 * static_cast<Eigen::Index>(lines_.size()) + p.size());
     Eigen::Index at = 0;
@@ -70,7 +70,7 @@ class Problem {
     }
     return J;
   }
-  // Of the differences, so that lines beside a mode that is elsewhere don't outvote all others.
+  // A robust cost of the differences: lines near a misplaced mode don't outvote all others.
   [[nodiscard]] double rough_cost(const Vector& p) const { return differences(p).array().square().log1p().sum(); }
   void search(Vector& p, Eigen::Index unknown, int count) const {
     const double centre = p[unknown];
@@ -84,7 +84,7 @@ class Problem {
     }
     p[unknown] = at;
   }
-  // The least cost of a gear that is clearly another one, all else as in p: a rigid one, or one in reach of the search.
+  // The smallest cost with a clearly different gear, all else as in p: a rigid one, or one within reach of the search.
   [[nodiscard]] double cost_of_others(const Vector& p, Eigen::Index joint, double half) const {
     constexpr double rigid = 4.0;
     Vector other = p;
@@ -145,7 +145,7 @@ std::vector<GearLine> gear_lines(const std::vector<MotionRecord>& fast, double l
     for (Eigen::Index k = 0; k < motors.mean.rows(); ++k) {
       GearLine line{2.0 * std::numbers::pi * record.base_Hz() * h[static_cast<std::size_t>(k)],
                     motors.mean.row(k).transpose(), sensor.mean.row(k).transpose(), Vector6::Zero()};
-      // A part of the size counts in both of its halves.
+      // This share of a line's size counts in both of its parts.
       const double force = line_share * line.reading.head<3>().norm(),
                    torque = line_share * line.reading.tail<3>().norm();
       line.deviation = sensor.variance.row(k).transpose().cwiseSqrt();

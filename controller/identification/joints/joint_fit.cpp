@@ -17,14 +17,14 @@ using description::rounded_text;
 using models::JointVector;
 using models::Vec3;
 
-// A figure known to no better than this share of its value isn't one.
+// A value whose half interval exceeds this share isn't identifiable.
 constexpr double most_half_share = 0.5;
-// Readings that the arm as it was found doesn't explain by more than this share: something else moves the handle.
+// If the arm's model leaves more than this share of the readings unexplained, something else moves the handle.
 constexpr double most_left_over = 0.25;
 constexpr double most_stale = 0.01;
-// Of the tool's weight and inertia, and of the zero's drift, in the slow motions: what may remain without a hand.
+// In slow motions, what may remain without a hand: share of the tool's weight and inertia, share of the zero's drift.
 constexpr double share_left = 0.1, drift_left = 0.03, deviations_left = 5.0;
-// A cell without a gear's stiffness or damping: where the search begins.
+// Start of the search for a cell without gear stiffness or damping.
 constexpr double first_mode_Hz = 40.0, first_damping_ratio = 0.03;
 
 Gears gears_of(const description::Cell& cell, const LinkResponse& response) {
@@ -120,7 +120,7 @@ class JointsProblem {
     return e;
   }
 
-  // Links that are otherwise in a way that S doesn't have change k by about as much as their inertia.
+  // An error of the links that S doesn't model changes k by about as much as their inertia.
   [[nodiscard]] Estimate gear(double value, double deviation_of_log) const {
     return judged(value, deviations_of_95 * value * std::hypot(deviation_of_log, allowed_.link_inertia),
                   "the tool hardly swings by it up to 40 Hz: its link is too light or its gear too stiff, or the "
@@ -149,7 +149,7 @@ class JointsProblem {
     e.viscous_Nms_per_rad = judged(value[2], deviations_of_95 * deviation[2], hidden_by);
   }
 
-  // With what else may be otherwise: links, the torque's scale, and the joint's own gear.
+  // Includes the errors of links, torque scale and the joint's own gear.
   [[nodiscard]] FrictionFit friction(int joint, const description::DriveDescription& drive) const {
     FrictionInputs inputs{.slow = record(joint, false),
                           .fast = record(joint, true),
@@ -178,13 +178,13 @@ class JointsProblem {
     return fit;
   }
 
-  // By which the torque at the setpoints may differ from the mean, as a share of J θ̈.
+  // The possible difference between the torque at the setpoints and the mean, as a share of J θ̈.
   [[nodiscard]] double between_setpoints(const description::DriveDescription& drive) const {
     const double stiff = 2.0 * std::numbers::pi * drive.position_bandwidth_Hz * records_.front().cycle_s;
     return stiff * stiff / 12.0;
   }
 
-  // In slow motions the sensor reads the tool's weight and inertia alone; their change from motion to motion is drift.
+  // In slow motions the sensor reads only the tool's weight and inertia; changes from motion to motion are drift.
   [[nodiscard]] std::string touched() const {
     const Vec3 first_S = records_.front().reading_S.leftCols<3>().colwise().mean();
     for (const MotionRecord& record : records_) {
@@ -208,7 +208,7 @@ class JointsProblem {
     return "";
   }
 
-  // The line of the slow motion itself; 0: it is explained.
+  // The residual of the slow motion's line; 0: explained.
   [[nodiscard]] double unexplained_N(const MotionRecord& record) const {
     const Spectrum motors = spectrum(record.motor_rad, record.rows_per_period, {1});
     const Spectrum sensor = spectrum(record.reading_S, record.rows_per_period, {1});

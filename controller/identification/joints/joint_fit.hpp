@@ -1,26 +1,26 @@
-// Friction, rotor inertia, gear stiffness and damping of each joint, from the records of small motions, with their
-// uncertainty. The arm's library gives masses, gravity and Jacobians; all else is here.
+// Identifies friction, rotor inertia, gear stiffness and gear damping of each joint from records of small motions, with
+// uncertainties. The arm's library gives masses, gravity and Jacobians; everything else is here.
 //
-// A joint, after the gear, with θ the motor's angle and φ the link's (rad; of a linear joint read m, N, kg):
+// For a joint, behind the gear, with θ the motor's angle and φ the link's (rad; for linear joints m, N, kg):
 //   τ = J θ̈ + b θ̇ + F sgn(θ̇) + τ_gear                                                      (1)
 //   τ_gear = k (θ − φ) + d (θ̇ − φ̇) = [M(φ) φ̈ + τ_g(φ)]                                     (2)
-//   τ  Nm, the motor's by 6077h times rated_torque_Nm        J  kg m², rotor as seen at the joint
+//   τ  Nm, motor torque: 6077h times rated_torque_Nm         J  kg m², rotor's inertia at the joint
 //   F  Nm, Coulomb friction    b  Nms/rad, viscous friction  k  Nm/rad, d  Nms/rad, gear
 //   M  kg m², links and tool   τ_g  Nm, gravity
 //
-// Gears first. Motors are led by their drives, so that θ is known whatever friction does, and the sensor reads how the
-// tool at the far end swings: link_response.hpp, fast motions, all joints at once. Unknown are ln k, ln d, the sensor's
-// delay and its scale. The response isn't convex in k, so each k is first tried from a third to three times the cell's.
-// Then (1), for each joint, in the lines of both motions: linear in J, F, b and in the delay δ of 6077h,
-// τ(t) ≈ τ_read + δ dτ_read/dt. Friction of the fast motion counts for itself, since it is that of slower speeds.
+// Gears come first. The drives control the motors, so θ is known independently of friction, and the sensor reads how
+// the tool swings (link_response.hpp; fast motions of all joints). Unknown are ln k, ln d, the sensor's delay and
+// scale. The response isn't convex in k, so each k is first tried from a third to three times the cell's value. Then
+// (1) is fitted for each joint to the lines of both motions: linear in J, F, b and the delay δ of 6077h, τ(t) ≈ τ_read
+// + δ dτ_read/dt. The fast motion has its own friction, since it reaches lower speeds.
 //
-// A drive reads its torque where setpoints follow one another, once a cycle T. One that goes straight from setpoint to
-// setpoint with a position loop of bandwidth f_p gives less there than in the mean, by (2π f_p T)²/12 of J θ̈; one that
-// goes on a curve, or filters what it reads, doesn't. J is allowed to be off by that, as a standard deviation.
+// A drive reads its torque once a cycle T, where two setpoints meet. If it moves straight between setpoints, with a
+// position loop of bandwidth f_p, it reads less there than the mean, by (2π f_p T)²/12 of J θ̈; otherwise not. So J has
+// this standard deviation.
 //
-// Not measured, and therefore allowed for (Allowed): links whose inertias are others than the URDF's, a drive whose
-// torque has another scale, a sensor that is tilted. The interval is what all that and the noise leave open; a figure
-// that is then known to half of its value at best is called not identifiable.
+// Allowances (Allowed) cover what isn't measured: link inertias that differ from the URDF's, a wrong scale of the
+// drive's torque, a tilted sensor. The interval includes these and the noise. A value known at best to half of itself
+// is not identifiable.
 #pragma once
 
 #include <string>
@@ -30,12 +30,12 @@
 
 namespace proxarm::identification {
 
-// Standard deviations of what isn't measured, as shares.
+// Standard deviations of quantities that aren't measured, as shares.
 struct Allowed {
   double link_inertia = 0.025, torque_scale = 0.025, sensor_scale = 0.03;
-  double line = 0.01;          // of a line's size: tilted sensor, poses that change, resolution
-  double torque_line = 0.003;  // likewise of the drive's torque
-  double zero_drift_N = 1.0;   // of the sensor, while all motions last
+  double line = 0.01;          // of a line's size: tilted sensor, changing poses, resolution
+  double torque_line = 0.003;  // the same for the drive's torque
+  double zero_drift_N = 1.0;   // of the sensor, over all motions
 };
 
 struct Estimate {
@@ -50,12 +50,12 @@ struct JointEstimates {
 
 struct JointsFit {
   std::vector<JointEstimates> joints;
-  // Why nothing of it is to be believed: a hand at the handle, say; empty: nothing speaks against it.
+  // Why the whole result is doubtful, such as a hand at the handle; empty: no doubt.
   std::string doubt;
-  double left_over_share = 0.0;  // of the sensor's lines, root mean square
+  double left_over_share = 0.0;  // residual share of the sensor's lines, root mean square
 };
 
-// Precondition: records are whole, two of each joint in their order. Throws SetupError for an arm that can't be built.
+// Precondition: complete records, two of each joint in the joints' order. Throws SetupError if the arm can't be built.
 JointsFit identify_joints(const description::Cell& cell, const std::vector<MotionRecord>& records,
                           const Allowed& allowed);
 

@@ -1,15 +1,15 @@
-// How the joints are moved to be identified, one after the other, and what encoders, drives and sensor read meanwhile.
+// Moves the joints for identification, one after the other, and records encoders, drives and sensor.
 //
-// Each joint makes two motions about the pose in which the arm was found, with f = 1/period the base of both:
+// Each joint makes two motions about the arm's initial pose, with the base frequency f = 1/period:
 //   slow   q = A sin(2π f t)                          friction: the torque's square and sine parts
 //   fast   q = Σ_h a/(2π h f)² cos(2π h f t + ψ_h)    rotor, gear: lines from 3 to 40 Hz, h = 6, 9, 12 …
-// with ψ_h of Schroeder ("Synthesis of low-peak-factor signals", 1970), which keep the peak of such a sum low. Both are
-// faded in and out by minimum-jerk ramps; one period later, when the steel swings steadily, whole periods are recorded:
-// their lines have no leakage, and what differs from period to period is noise.
+// ψ_h are Schroeder's phases ("Synthesis of low-peak-factor signals", 1970), which keep the peak low. Minimum-jerk
+// ramps fade both motions in and out. Recording starts one period after the ramp, when the arm swings steadily, and
+// covers whole periods: the lines have no leakage, and differences between periods are noise.
 //
-// A and a are as large as these bounds let them be, at most 0.1 rad and 3 % of the drive's acceleration a line: 0.06
-// m/s of the tool (slow) and 0.25 m/s² of it a line (fast), a fifth of a joint's speed, a fifth of its drive's torque,
-// half of the way to the end of its range. workspace_m and keep_out_m are kept along the whole of each motion.
+// A and a are as large as these bounds allow: 0.1 rad; 3 % of the drive's acceleration per line; 0.06 m/s (slow) and
+// 0.25 m/s² per line (fast) of the tool; a fifth of the joint's speed and of its drive's torque; half of the way to the
+// end of its range; workspace_m and keep_out_m.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,7 +25,7 @@ namespace proxarm::identification {
 
 inline constexpr int slow_periods = 3, fast_periods = 4;
 inline constexpr double lowest_line_Hz = 3.0, highest_line_Hz = 40.0;
-inline constexpr double base_period_s = 2.0, ramp_s = 1.0;  // the former rounded to whole cycles
+inline constexpr double base_period_s = 2.0, ramp_s = 1.0;  // the period is rounded to whole cycles
 
 struct JointMotion {
   int joint = 0;
@@ -35,36 +35,35 @@ struct JointMotion {
   [[nodiscard]] int periods() const noexcept { return fast ? fast_periods : slow_periods; }
 };
 
-// What was read during a motion, a row for each cycle, whole periods.
+// The readings of a motion: whole periods, a row per cycle.
 struct MotionRecord {
   JointMotion motion;
   int rows_per_period = 0;
   double cycle_s = 0.0;
-  Eigen::MatrixXd motor_rad, torque_share;  // a column for each joint; torques: NaN where the drive doesn't tell
+  Eigen::MatrixXd motor_rad, torque_share;  // a column per joint; torques: NaN if the drive doesn't report it
   Eigen::MatrixXd reading_S;                // N, Nm
-  int rows = 0;                             // that have been read
+  int rows = 0;                             // read so far
   int stale = 0;                            // cycles in which a drive didn't answer
 
   [[nodiscard]] double base_Hz() const noexcept { return 1.0 / (rows_per_period * cycle_s); }
   [[nodiscard]] bool whole() const noexcept { return rows == static_cast<int>(motor_rad.rows()); }
 };
 
-// The lines of the fast motion, as multiples of the base frequency; 12 cycles are in the period of the last one.
+// The lines of the fast motion as multiples of the base frequency; the highest one has 12 cycles per period.
 std::vector<int> fast_lines(int rows_per_period, double cycle_s);
 
-// The motions of a joint each, about the motors' angles `motor_rad`. Throws SetupError where a joint has no room.
+// Two motions for each joint, about the motors' angles `motor_rad`. Throws SetupError if a joint has no room to move.
 std::vector<JointMotion> joint_motions(const description::Cell& cell, const models::Arm& arm,
                                        const models::JointVector& motor_rad, double cycle_s);
 
-// What the arm is about to do, in words, a line for each joint.
 std::string text(const std::vector<JointMotion>& motions, const models::Arm& arm, double cycle_s);
 
 class JointExercise final : public proof::Exercise {
  public:
-  // Precondition: `cell` and `arm` outlive it.
+  // Precondition: `cell` and `arm` outlive this object.
   JointExercise(const description::Cell& cell, const models::Arm& arm, double cycle_s);
 
-  // A station for each motion; what is recorded finds its room here. Throws SetupError as joint_motions() does.
+  // Returns a station for each motion and allocates its record. Throws SetupError as joint_motions() does.
   std::vector<proof::Station> stations(const models::JointVector& motor_rad);
 
   [[nodiscard]] models::JointVector offset_rad(std::size_t station, double time_s) const noexcept override;

@@ -25,7 +25,7 @@ std::size_t style_of(const Curve& curve) {
   return static_cast<std::size_t>(curve.style) % controller::series_styles().size() + 1;
 }
 
-// Ticks at the given places, or at gnuplot's own; of many decades every other one.
+// Ticks at the given places, else at gnuplot's; over many decades at every other decade.
 void ticks(std::ostream& gp, char axis, const std::vector<double>& places, bool many_decades) {
   if (!places.empty()) return set_ticks(gp, axis, places);
   gp << "set " << axis << "tics " << (many_decades ? "100\n" : "auto\n");
@@ -46,7 +46,6 @@ void set_axis(std::ostream& gp, char axis, double low, double high, bool log, co
 
 constexpr std::size_t name_width = 9;  // letters
 
-// Names below an axis that counts, one or more lines each.
 void name_places(std::ostream& gp, const std::vector<std::string>& names) {
   gp << "set xtics (";
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -55,7 +54,6 @@ void name_places(std::ostream& gp, const std::vector<std::string>& names) {
   gp << ") font ',15'\nset xrange [-0.5:" << static_cast<double>(names.size()) - 0.5 << "]\n";
 }
 
-// Draws shaded spans and straight lines behind the curves of a panel, with their texts.
 void draw_grounds(std::ostream& gp, const Panel& panel, int& label) {
   int number = 0;
   for (const Span& span : panel.x_spans) {
@@ -85,7 +83,6 @@ void draw_grounds(std::ostream& gp, const Panel& panel, int& label) {
   }
 }
 
-// The words of a note beside its point, on a ground of the page.
 void draw_note(std::ostream& gp, const Note& note, int label) {
   struct Placed {
     const char *align, *offset;
@@ -110,7 +107,7 @@ void draw_note(std::ostream& gp, const Note& note, int label) {
      << rgb("ink") << " boxed\n";
 }
 
-// One number of the data a line; a number that isn't finite leaves a gap.
+// Writes one point per line; a y that isn't finite leaves a gap.
 void write_points(std::ostream& data, const Curve& curve) {
   for (std::size_t k = 0; k < curve.x.size(); ++k) {
     if (std::isfinite(curve.y[k])) {
@@ -122,7 +119,7 @@ void write_points(std::ostream& data, const Curve& curve) {
   data << "\n\n";
 }
 
-// "with lines ls 2", as gnuplot has it.
+// For example "with lines ls 2", for gnuplot.
 std::string look_of(const Curve& curve, double mark_size) {
   return std::string("with ") + (curve.line ? (curve.marks ? "linespoints" : "lines") : "points") + " ls " +
          std::to_string(style_of(curve)) + (curve.marks ? " ps " + std::to_string(mark_size) : "");
@@ -148,7 +145,7 @@ std::vector<std::string> plots_of(const Panel& panel, std::ostream& data, std::s
   return plots;
 }
 
-// Entries of the key, each once, of all panels' curves: gnuplot draws them for the first panel, of no data.
+// The key's entries for all panels' curves, each name once. gnuplot draws them with the first panel, without data.
 std::vector<std::string> key_entries(const Chart& chart, std::size_t& longest) {
   std::vector<std::string> entries;
   std::set<std::string> named;
@@ -164,7 +161,6 @@ std::vector<std::string> key_entries(const Chart& chart, std::size_t& longest) {
 
 constexpr double key_line = 24.0;
 
-// The frames of all panels, and the place of the key below them.
 struct Layout {
   std::vector<Frame> frames;
   double key_top = 0.0, height = 0.0;
@@ -201,7 +197,7 @@ Layout layout_of(const Chart& chart, double top, std::size_t entries, std::size_
     const std::size_t columns = wide ? 1 : static_cast<std::size_t>(chart.columns);
     const std::size_t end = std::min(i + columns, chart.panels.size());
     double above = 0.0, below = 0.0, right = 0.0;
-    if (chart.columns == 1) {  // frames below each other are of one width
+    if (chart.columns == 1) {  // frames below each other have the same width
       for (const Panel& panel : chart.panels) right = std::max(right, room_right(panel));
     }
     for (std::size_t k = i; k < end; ++k) {
@@ -229,7 +225,7 @@ Layout layout_of(const Chart& chart, double top, std::size_t entries, std::size_
   return layout;
 }
 
-// All of a panel but its curves.
+// Sets everything of a panel except its curves.
 void set_panel(std::ostream& gp, const Panel& panel) {
   set_axis(gp, 'x', panel.x_low, panel.x_high, panel.log_x, panel.x_ticks);
   set_axis(gp, 'y', panel.y_low, panel.y_high, panel.log_y, panel.y_ticks);

@@ -26,7 +26,7 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-// How many letters of a size fit into a width.
+// The number of letters of this size that fit into the width.
 std::size_t fitting(int width, int size) { return static_cast<std::size_t>(1.7 * width / size); }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The page of a chart or a map: its title, and the places of panels on it. Lengths in pixels, from the top left.
+// Lays out the page of a chart or a map: its title, and where panels are. Lengths in pixels, from the top left.
 #pragma once
 
 #include <iosfwd>
@@ -7,7 +7,7 @@
 
 namespace proxarm::studies {
 
-// A gnuplot string in which nothing is special.
+// A gnuplot string with all special characters escaped.
 std::string plain(const std::string& text);
 // The same in bold.
 std::string bold(const std::string& text);
@@ -15,25 +15,24 @@ std::string bold(const std::string& text);
 // Lines below each other.
 std::string stacked(const std::vector<std::string>& lines);
 
-// Lines of at most `width` letters each, broken at blanks, but not behind a number.
+// Breaks text at blanks into lines of at most `width` letters, but not after a number.
 std::vector<std::string> wrapped(const std::string& text, std::size_t width);
 
-// "0.98", "1360": so many digits that count, without an exponent where the number isn't below a thousandth.
+// "0.98", "1360": a number with this many significant digits, without an exponent from 0.001 on.
 std::string number_text(double value, int digits);
 
-// "10,000"
+// For example "10,000".
 std::string count_text(double count);
 
-// Letters of an UTF-8 text.
+// The number of letters in a UTF-8 text.
 std::size_t letters(const std::string& text);
 
 // "'#17202a'": a colour of the palette on white, for gnuplot's rgb.
 std::string rgb(const char* name);
 
-// Ticks at these places of an axis, 'x' or 'y'.
+// `axis`: 'x' or 'y'.
 void set_ticks(std::ostream& gp, char axis, const std::vector<double>& places);
 
-// A panel's frame.
 struct Frame {
   double left = 0.0, top = 0.0, right = 0.0, bottom = 0.0;
 };
@@ -45,9 +44,9 @@ class Page {
   [[nodiscard]] double top() const noexcept { return top_; }
   // Begins the script of a page of that height, with its title.
   void begin(std::ostream& gp, double height);
-  // What follows is drawn into this frame.
+  // Places the next plot in this frame.
   void set_frame(std::ostream& gp, const Frame& frame) const;
-  // Shares of the page, as gnuplot's `screen` has them.
+  // Shares of the page, for gnuplot's `screen`.
   [[nodiscard]] double screen_x(double x) const noexcept { return x / width_; }
   [[nodiscard]] double screen_y(double y) const noexcept { return 1.0 - y / height_; }
 

@@ -15,7 +15,7 @@ namespace {
 constexpr double map_left = 92.0, map_right = 14.0, map_above = 56.0, map_between = 44.0, map_below = 68.0,
                  scale_width = 96.0, note_height = 30.0;
 
-// `steps` colours of the palette's map, from its first to its last one, each for one part of the scale.
+// `steps` colours from the palette's map, from its first to its last one, each for one part of the scale.
 std::string palette_steps(int steps) {
   const auto colours = controller::map_colours();
   std::string text;
@@ -31,7 +31,7 @@ std::string palette_steps(int steps) {
   return text;
 }
 
-// Where the cell of a grid's line ends: half way to the next, and as far beyond the last.
+// Where a grid cell ends: halfway (logarithmically) to the next line, and as far beyond the last one.
 double edge(const std::vector<double>& grid, std::size_t k, double side) {
   const std::size_t last = grid.size() - 1;
   if (last == 0) return grid[0] * (side < 0.0 ? 0.9 : 1.1);
@@ -40,7 +40,7 @@ double edge(const std::vector<double>& grid, std::size_t k, double side) {
   return outer ? grid[k] * std::sqrt(grid[k] / grid[other]) : std::sqrt(grid[k] * grid[other]);
 }
 
-// One line a cell, for gnuplot's boxxyerror; of a map without a cell one that isn't drawn.
+// One line per cell, for gnuplot's boxxyerror; for a map without cells, a line that isn't drawn.
 std::string cells_of(const Map& map) {
   std::ostringstream cells;
   cells.precision(8);
@@ -56,7 +56,8 @@ std::string cells_of(const Map& map) {
   return cells.str().empty() ? "1 1 1 1 1 1 nan\n" : cells.str();
 }
 
-// All of a map but its cells. `first`, `lowest`: of its row and column.
+// Sets everything of a map except its cells. `first`: it is the first in its row; `lowest`: it is the last in its
+// column.
 void set_map(std::ostream& gp, const MapChart& chart, const Map& map, bool first, bool lowest) {
   for (const auto& [axis, grid] : {std::pair{'x', &map.x}, std::pair{'y', &map.y}}) {
     gp << "set logscale " << axis << "\nset " << axis << "range [" << edge(*grid, 0, -1.0) << ":"
@@ -94,7 +95,7 @@ Scale scale_of(const MapChart& chart) {
 
 namespace {
 
-// Colours of half a decade each, with a tick between any two.
+// Colours of half a decade each, with ticks between them.
 void set_scale(std::ostream& gp, const Scale& scale) {
   const auto halves = static_cast<int>(std::lround(2.0 * std::log10(scale.high / scale.low)));
   gp << "set palette defined (" << palette_steps(halves) << ")"
@@ -106,7 +107,6 @@ void set_scale(std::ostream& gp, const Scale& scale) {
   gp << ")\n";
 }
 
-// Where maps are on the page.
 struct MapLayout {
   std::size_t columns, rows;
   double top, width, frames_end;
@@ -126,7 +126,6 @@ struct MapLayout {
   }
 };
 
-// One scale of colours for all maps, below its label.
 void place_scale(std::ostream& gp, const MapChart& chart, const Page& page, const MapLayout& layout) {
   gp << "set label 1101 " << plain(chart.z_label) << " at screen "
      << page.screen_x(chart.width - 0.5 * scale_width - 4.0) << ", screen " << page.screen_y(layout.top - 18.0)
@@ -135,7 +134,7 @@ void place_scale(std::ostream& gp, const MapChart& chart, const Page& page, cons
      << page.screen_y(layout.top) - page.screen_y(layout.frames_end) << "\n";
 }
 
-// The cells, and a white mark with a ring at each note.
+// Draws the cells, and a white mark with a ring at each note.
 void plot_map(std::ostream& gp, std::ostream& data, const Map& map, std::size_t& block) {
   data << cells_of(map) << "\n\n";
   gp << "plot 'data' index " << block++

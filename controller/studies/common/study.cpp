@@ -207,7 +207,7 @@ Outcome merge_study(const std::function<const Study&(const std::string&)>& study
     }
     table.read_csv(fs::path(file).replace_extension(".csv"));
   }
-  // Every job once: rows of a job come from one part.
+  // Each job may occur once; all rows of a job come from one part.
   std::set<std::size_t> seen;
   std::size_t previous = static_cast<std::size_t>(-1);
   for (std::size_t row = 0; row < table.rows(); ++row) {

@@ -1,10 +1,11 @@
-// What all studies share: jobs on all cores, a progress bar, parts of a sweep (shards) and their merging, and the files
+// The frame of all studies: jobs on all cores, a progress bar, parts of a sweep (shards) and their merging, and the
+// files
 //   NAME.csv   every run
-//   NAME.json  the headline figures, what they mean (`keys`), and what they came from: seed, machine, command, version
+//   NAME.json  the headline figures, their meaning (`keys`), and their origin: seed, machine, command, version
 //   *.svg      plots
 //
-// A study is a number of jobs that don't know of each other. Headline and plots are made of the table alone, so parts
-// that were computed elsewhere and merged give the same files as one run.
+// A study consists of independent jobs. Headline and plots use the table alone, so merged parts give the same files as
+// a single run.
 #pragma once
 
 #include <cstdint>
@@ -22,15 +23,15 @@
 namespace proxarm::studies {
 
 struct Options {
-  bool quick = false;            // fewer and coarser runs, for a look and for continuous integration
-  std::uint64_t seed = 1;        // of all that is random
-  std::optional<double> runs{};  // where a study has a count of runs; else its own
+  bool quick = false;            // fewer and coarser runs, for a first look and for continuous integration
+  std::uint64_t seed = 1;        // of all random numbers
+  std::optional<double> runs{};  // number of runs, if the study has one; unset: its own number
 };
 
 // The I-th of N parts, counted from 1: jobs I−1, I−1+N, …
 struct Shard {
   std::size_t index = 1, count = 1;
-  // "2/8". Throws description::SetupError.
+  // Parses "2/8". Throws description::SetupError.
   static Shard parse(const std::string& text);
   [[nodiscard]] bool whole() const noexcept { return count == 1; }
 };
@@ -45,16 +46,16 @@ class Study {
   [[nodiscard]] virtual std::string name() const = 0;
   [[nodiscard]] virtual std::vector<Column> columns() const = 0;
   [[nodiscard]] virtual std::size_t jobs(const Options& options) const = 0;
-  // One job; called from several threads at once. At least one row.
+  // Runs one job and returns at least one row. Several threads call it at once.
   [[nodiscard]] virtual std::vector<Row> run(std::size_t job, const Options& options) const = 0;
   // The headline of the whole table, with {"keys": {name: meaning}}.
   [[nodiscard]] virtual nlohmann::json headline(const Table& table, const Options& options) const = 0;
   // Writes plots into `out`; returns warnings.
   [[nodiscard]] virtual std::vector<std::string> plot(const Table& table, const Options& options,
                                                       const std::filesystem::path& out) const = 0;
-  // A few lines for a person.
+  // A few lines for people.
   [[nodiscard]] virtual std::string text(const nlohmann::json& headline) const = 0;
-  // True if something was found that must not be: exit status 1.
+  // True if the study found a violation: exit status 1.
   [[nodiscard]] virtual bool failed(const nlohmann::json& /*headline*/) const { return false; }
 };
 
@@ -64,23 +65,23 @@ struct Outcome {
   bool failed = false;
 };
 
-// Runs the jobs of the shard on `threads` threads (0: one per core), shows progress on a terminal, writes the files. A
-// shard that isn't the whole has a CSV, and a JSON that says which part it is.
+// Runs the shard's jobs on `threads` threads (0: one per core), shows progress on a terminal, and writes the files. For
+// a part of the whole, these are a CSV and a JSON that names the part.
 Outcome run_study(const Study& study, const Options& options, const Shard& shard, const std::filesystem::path& out,
                   const std::string& command, unsigned threads = 0);
 
-// Joins the parts of a study that lie in `parts` and writes its files to `out`. Throws description::SetupError where
-// parts are missing, twice there, or not of one study and one seed.
+// Joins the parts of a study in the folders `parts` and writes the study's files to `out`. Throws
+// description::SetupError if parts are missing, occur twice, or differ in study or seed.
 Outcome merge_study(const std::function<const Study&(const std::string&)>& study_named,
                     const std::vector<std::filesystem::path>& parts, const std::filesystem::path& out);
 
-// Calls work(i) for all i < count on `threads` threads (0: one per core). What a call throws is thrown here.
+// Calls work(i) for all i < count on `threads` threads (0: one per core). Rethrows an exception of a call.
 void parallel(std::size_t count, unsigned threads, const std::function<void(std::size_t)>& work);
 
 // The seed of a job, derived from the study's.
 std::uint64_t job_seed(std::uint64_t seed, std::size_t job);
 
-// "model name, N cores", as /proc/cpuinfo has it.
+// "model name, N cores", as in /proc/cpuinfo.
 std::string machine();
 
 }  // namespace proxarm::studies

@@ -1,7 +1,7 @@
-// All runs of a study: rows of numbers and words, as its CSV file has them.
+// All runs of a study: rows of numbers and words, as in its CSV file.
 //
-// Numbers are written with 17 digits, so that what is read back is the same to the bit: headline and plots of parts
-// that were merged are those of one run.
+// Numbers are written with 17 digits, so they are read back to the bit, and merged parts give the same headline and
+// plots as a single run.
 #pragma once
 
 #include <cstddef>
@@ -24,17 +24,17 @@ struct Column {
 
 class Table {
  public:
-  // Every table begins with the number of the job that made the row.
+  // Adds a first column for the number of the job that made the row.
   explicit Table(std::vector<Column> columns);
 
-  // One row; its cells fit the columns after `job`.
+  // Adds a row, whose cells fit the columns after `job`.
   void add(std::size_t job, const Row& row);
-  // By job, rows of a job in their order.
+  // Keeps the order of each job's rows.
   void sort_by_job();
 
   [[nodiscard]] std::size_t rows() const noexcept { return jobs_.size(); }
   [[nodiscard]] std::size_t job(std::size_t row) const noexcept { return jobs_[row]; }
-  // A column's place, for number() and text(). Throws std::out_of_range for a name that isn't there.
+  // Index of a column, for number() and text(). Throws std::out_of_range for an unknown name.
   [[nodiscard]] std::size_t column(std::string_view name) const;
   [[nodiscard]] double number(std::size_t row, std::size_t column) const noexcept {
     return cells_[row * columns_.size() + column];
@@ -43,7 +43,7 @@ class Table {
     return words_[static_cast<std::size_t>(number(row, column))];
   }
 
-  // Throws std::runtime_error where the file can't be written.
+  // Throws std::runtime_error if the file can't be written.
   void write_csv(const std::filesystem::path& file) const;
   // Adds the rows of a file that write_csv() made with the same columns. Throws description::SetupError with file and
   // line.
@@ -54,7 +54,7 @@ class Table {
 
   std::vector<Column> columns_;
   std::vector<std::size_t> jobs_;
-  std::vector<double> cells_;  // of a text column: the word's index
+  std::vector<double> cells_;  // in a text column: the word's index
   std::vector<std::string> words_;
   std::map<std::string, std::size_t, std::less<>> word_index_;
 };

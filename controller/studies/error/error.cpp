@@ -25,14 +25,14 @@ using models::Vec3;
 using nlohmann::json;
 
 // The rate at which (26) changes the speed of a frictionless slide around a sphere, 1/s, and the predicted T f_n/(M R).
-// Speed is lost inside of a sphere and gained outside.
+// Speed is lost on the inside and gained on the outside.
 json energy_rate(bool inside) {
   constexpr double R = 0.1, M = 1.0, T = 1e-3, speed = 0.2, push = 5.0;
   std::vector<models::World::Entry> entries;
   entries.push_back({std::make_unique<models::Sphere>(models::PointCore{Vec3::Zero()}, R, 0.0, inside), 0, 0});
   models::World world(std::move(entries));
   AdmittanceProxy<3> proxy({.mass_kg = M, .period_s = T}, world);
-  const double toward = inside ? 1.0 : -1.0;  // the push, onto the surface
+  const double toward = inside ? 1.0 : -1.0;  // sign of the push, onto the surface
   proxy.start({.q = R * Vec3::UnitX(),
                .v = speed * Vec3::UnitY(),
                .a = -speed * speed / R * Vec3::UnitX(),

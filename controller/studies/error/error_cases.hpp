@@ -1,7 +1,7 @@
-// Motions whose exact solution is known: what the error study compares with.
+// The error study's motions, whose exact solutions are known.
 //
-// Metres, kilograms, newtons, seconds. Each has its world twice: as 𝒢 for (26), and as surfaces for the penalty methods
-// that it is compared with (penalty_world.hpp).
+// Units are m, kg, N, s. Each motion has its world twice: as 𝒢 for (26), and as surfaces for the penalty methods
+// (penalty_world.hpp).
 #pragma once
 
 #include <cmath>
@@ -15,7 +15,7 @@
 
 namespace proxarm::studies {
 
-// The force that the sensor measures, at time t with the tool at q and v:
+// The force that the sensor measures at time t, with the tool at q and v:
 //   h = constant + ramp t + sine sin(ω t) − K_h (q − x_int) − D_h v
 struct CaseForce {
   models::Vec3 constant = models::Vec3::Zero();
@@ -53,8 +53,8 @@ struct ErrorCase {
   double friction = 0.0;
   double medium_Ns_per_m = 0.0;  // where x > 0
   bool starts_in_contact = false;
-  double stop_s = -1.0;  // when it comes to rest; below 0: never
-  bool turns = false;    // the normal or the slide's direction turns: (26) is of first order there
+  double stop_s = -1.0;  // when it comes to rest; negative: never
+  bool turns = false;    // the normal or the slide's direction turns, so (26) is of first order
   std::function<CaseState(double)> exact{};
   std::function<std::unique_ptr<models::GeometricAlgorithm<3>>()> world{};
 };

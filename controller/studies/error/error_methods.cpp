@@ -18,7 +18,7 @@ using models::Vec3;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Numbers of steps of a motion, from coarse to fine; one of them makes steps of 1 ms. With at most `instants` steps,
+// Numbers of steps of a motion, from coarse to fine; one of them gives steps of 1 ms. With at most `instants` steps,
 // each step ends at an instant.
 std::vector<int> step_counts(const ErrorCase& which, bool quick) {
   std::vector<int> counts{4, 5, 6, 10, 12, 15, 20, 30, static_cast<int>(std::lround(which.duration_s / 1e-3))};
@@ -30,16 +30,16 @@ std::vector<int> step_counts(const ErrorCase& which, bool quick) {
   return counts;
 }
 
-// At how many places within a step the motion begins.
+// Number of places within a step at which the motion starts.
 int phase_count(bool quick) { return quick ? 5 : 50; }
 
-// The velocity at the last sample, from the means over the steps before it: the slope of the cubic through the last
-// four positions. (That of a parabola through three errs by T²v̈/3, which was most of what order 2 erred by at a hand
-// with damping.)
+// The velocity at the last sample: the slope of the cubic through the last four positions, from the mean velocities
+// between them. A parabola through three positions errs by T²v̈/3, which was most of order 2's error with a damped
+// hand.
 class SampledVelocity {
  public:
   explicit SampledVelocity(const Vec3& mean) : v_1_(mean) {}
-  // `mean`: of the step that has been taken.
+  // `mean`: over the step just taken.
   Vec3 operator()(const Vec3& mean) noexcept {
     const Vec3 v = known_ ? Vec3((11.0 * mean - 7.0 * v_1_ + 2.0 * v_2_) / 6.0) : Vec3(1.5 * mean - 0.5 * v_1_);
     v_2_ = v_1_;
@@ -50,10 +50,10 @@ class SampledVelocity {
 
  private:
   Vec3 v_1_, v_2_ = Vec3::Zero();  // one step and two steps before
-  bool known_ = false;             // v_2_
+  bool known_ = false;             // whether v_2_ is set
 };
 
-// A method under study: a state at time t, from t_0 on, and step() to the next sample.
+// The proxy under study: its state at time t from t_0 on, and step() to the next sample.
 class Ours {
  public:
   Ours(const ErrorCase& which, Method method, double T, double t_0)
@@ -131,7 +131,7 @@ class Penalty {
     v_ += T_ / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
   }
 
-  // v' = v + T (h + f(q + T v', v'))/M by Newton's method.
+  // Solves v' = v + T (h + f(q + T v', v'))/M by Newton's method.
   void implicit_euler(const Vec3& h) noexcept {
     Vec3 next = v_;
     Mat3 slope;
@@ -154,7 +154,6 @@ class Penalty {
   SampledVelocity sampled_{Vec3::Zero()};
 };
 
-// Of a run that begins at t_0.
 template <typename Stepper>
 Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps, double t_0) {
   const int per_instant = std::max(1, steps / instants), compared = steps / per_instant;
@@ -174,7 +173,7 @@ Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps, double t_0
     if ((k + 1) % per_instant != 0) continue;
     const CaseState exact = which.exact(t);
     sum_q += (stepper.q() - exact.q).squaredNorm();
-    // The velocity of a step that contains an impact belongs to no instant.
+    // In a step with an impact the velocity jumps, so it isn't compared.
     if (which.stop_s < 0.0 || std::abs(t - which.stop_s) > 2.0 * which.duration_s / instants) {
       sum_v += (stepper.v() - which.exact(stepper.v_label_s(t)).v).squaredNorm();
       ++counted_v;
@@ -195,11 +194,11 @@ double ns_per_step(auto& stepper, double T, int steps) {
   const auto begun = std::chrono::steady_clock::now();
   for (int k = 0; k < steps; ++k) stepper.step(k * T);
   const double ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begun).count();
-  // Never, but what is stepped has to be looked at.
+  // Never true, but keeps the compiler from removing the steps.
   return std::isnan(stepper.q().x()) ? infinity : ns / steps;
 }
 
-// Short rounds, a step of (26) and one of the method in turn: what else the machine does meets both.
+// Short rounds that alternate between a step of (26) and one of the method, so that other load disturbs both.
 template <typename Make>
 void time_rounds(const ErrorCase& which, Make make, int steps, MethodRun& run) {
   const double T = which.duration_s / steps;
@@ -215,7 +214,7 @@ void time_rounds(const ErrorCase& which, Make make, int steps, MethodRun& run) {
   run.of_reference = Spread::of(shares);
 }
 
-// A stiff wall that blows up at these steps may be fine at finer ones: then its time is taken there.
+// A stiff wall that diverges at these steps may be stable at finer ones; then its time is measured there.
 template <typename Make>
 void time_steps(const ErrorCase& which, Make make, int steps, MethodRun& run) {
   for (const int finer : {1, 4, 16}) {
@@ -258,7 +257,7 @@ std::vector<MethodRun> runs(const ErrorCase& which, bool quick, Make make) {
 
 }  // namespace
 
-// The nearest of the values, so that it is one that was found, infinity among them.
+// The nearest of the values, so that the result is one of them; may be infinite.
 Spread Spread::of(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const auto at = [&](double share) {

@@ -1,5 +1,5 @@
-// The methods that the error study compares, and their runs on a case: (26), order 2, penalty contact by three
-// integrators, and the common ROS rule (error.hpp).
+// Runs the error study's methods on a case: (26), order 2, penalty contact with three integrators, and the common ROS
+// rule (error.hpp).
 #pragma once
 
 #include <array>
@@ -14,34 +14,34 @@ enum Method { order_1, order_2, penalty_euler, penalty_rk4, penalty_implicit, ro
 inline constexpr std::array<const char*, method_count> method_names{
     "1", "2", "penalty_euler", "penalty_rk4", "penalty_implicit", "ros"};
 
-// Instants of a motion at which positions are compared.
+// Number of instants at which positions are compared.
 inline constexpr int instants = 60;
 
-// All that a method is tried with on a case.
+// All tunings with which a method is tried on a case.
 std::vector<Tuning> tunings(const ErrorCase& which, Method method, bool quick);
 
 struct Errors {
   double position_m = 0.0, velocity_m_per_s = 0.0, force_N = 0.0, energy_J = 0.0, stop_s = 0.0;
 };
 
-// What a number came to in many trials: the median, and what a tenth and nine tenths of them stay below.
+// Median, tenth and ninetieth percentile of a number over many trials.
 struct Spread {
   double low = 0.0, median = 0.0, high = 0.0;
 
   static Spread of(std::vector<double> values);
 };
 
-// Runs with one timestep, over all phases: where events fall within a step.
+// Runs with one timestep and all phases; the phase is where events fall within a step.
 struct MethodRun {
   int steps = 0;
   double period_s = 0.0;
   Errors errors;  // the medians
   double position_low_m = 0.0, position_high_m = 0.0;
   double reference_ns = 0.0;  // processor time of a step of (26)
-  Spread of_reference;        // that of the method's step as a share of it, measured in turn
+  Spread of_reference;        // time of the method's step divided by that of (26), measured alternately
 };
 
-// Runs of one method with one tuning, from coarse timesteps to fine ones.
+// Runs one method with one tuning, from coarse timesteps to fine ones.
 std::vector<MethodRun> run_method(const ErrorCase& which, Method method, const Tuning& tuning, bool quick);
 
 }  // namespace proxarm::studies

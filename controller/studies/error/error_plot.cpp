@@ -14,7 +14,7 @@
 namespace proxarm::studies {
 namespace {
 
-// An error of so little is rounding, and drawn below; one of more than a metre isn't drawn.
+// Errors below rounding_m are drawn at drawn_rounding_m; errors above a metre aren't drawn.
 constexpr double rounding_m = 1e-10, drawn_rounding_m = 3e-11, bottom_m = 1e-11, top_m = 1.0;
 
 double drawn_error(double error_m) { return error_m < rounding_m ? drawn_rounding_m : error_m; }
@@ -25,8 +25,8 @@ constexpr std::array<const char*, method_count> method_titles{
 
 enum Look { look_order_1, look_order_2, look_rival, look_fixed = 7, look_1_ms = 6, look_luck = 4 };
 
-// Over what errors are drawn: the time of a run, where an error is what nine of ten runs stay below, as run times are
-// compared; or the timestep, where it is the median.
+// The axis over which errors are drawn: the time of a run, with the error that nine of ten runs stay below, or the
+// timestep, with the median error.
 enum class Over { run_time, timestep };
 
 double x_of(Over over, const Runs& runs, std::size_t i) {
@@ -37,8 +37,8 @@ double error_of(Over over, const Runs& runs, std::size_t i) {
   return over == Over::run_time ? runs.error[i].high : runs.error[i].median;
 }
 
-// How many of the coarsest runs err less than a finer one does, by ten times and more: their ends come where all
-// methods are exact, which says nothing about the motion.
+// Number of coarse runs that are exact by chance: a finer run errs by more than ten times rounding. Their steps happen
+// to end where all methods are exact, which says nothing about the method.
 std::size_t lucky_runs(const Runs& ours, Over over) {
   std::size_t lucky = 0;
   double worst_finer = 0.0;
@@ -58,7 +58,7 @@ void add_point(Curve& curve, double x, double error_m) {
 
 void add_ours(const Runs& ours, Method method, Over over, Panel& panel) {
   Curve curve{.name = method_titles[method], .style = method == order_1 ? look_order_1 : look_order_2, .marks = true};
-  if (method == order_2) curve.mark_size = 1.3;  // others may lie upon it
+  if (method == order_2) curve.mark_size = 1.3;  // others may lie on it
   Curve luck{.name = "exact by luck: finer steps err more", .style = look_luck, .marks = true, .line = false};
   const std::size_t lucky = lucky_runs(ours, over);
   for (std::size_t i = 0; i < ours.T.size(); ++i) {
@@ -70,7 +70,7 @@ void add_ours(const Runs& ours, Method method, Over over, Panel& panel) {
 
 Curve rival_curve() { return {.name = "best of the others, tuned to the motion", .style = look_rival}; }
 
-// For each error the least run time in which any of the others reaches it, with all finer steps, too.
+// For each error the least run time in which another method reaches it, at that timestep and all finer ones.
 Curve rivals_over_run_time(const std::vector<Runs>& list) {
   Curve curve = rival_curve();
   for (double error = 0.5 * top_m; error > 0.5 * rounding_m; error *= std::pow(10.0, -0.1)) {
@@ -83,7 +83,6 @@ Curve rivals_over_run_time(const std::vector<Runs>& list) {
   return curve;
 }
 
-// The least error of all the others at each timestep.
 Curve rivals_over_timestep(const std::vector<Runs>& list) {
   std::map<double, double> least;
   for (const Runs& runs : list) {
@@ -119,7 +118,7 @@ void mark_1_ms(const std::vector<Runs>& list, Over over, Panel& panel) {
   panel.curves.push_back(curve);
 }
 
-// How many times as fast order 2 is as the best of the others; 0: not comparable.
+// How many times as fast order 2 is as the best other method; 0: not comparable.
 double times_as_fast(const std::vector<Runs>& list) {
   const double times = speedup_over_tuned(runs_of(list, method_names[order_2]), list).median;
   return times > 0.0 ? times : 0.0;
@@ -156,7 +155,7 @@ Panel panel_of(const ErrorCase& which, const std::vector<Runs>& list, const Fixe
   return panel;
 }
 
-// One range of x for all panels, in whole decades with some room at the right; labels at the outer ones alone.
+// Sets one range of x for all panels, in whole decades with some room at the right. Only the outer panels get labels.
 void share_x(Chart& chart, const std::string& x_label) {
   double low = std::numeric_limits<double>::infinity(), high = 0.0;
   for (const Panel& panel : chart.panels) {
@@ -184,7 +183,7 @@ std::string in_words(const ErrorCase& which) {
   return name;
 }
 
-// All motions in one panel: how many times as fast order 2 is, above the line or below it.
+// How many times as fast order 2 is, above or below the line at 1, in one panel for all motions.
 Panel verdict_panel(const RunsByCase& all) {
   Panel panel{.title = "How many times as fast order 2 is as the best of the others, for the same error",
               .y_label = "times as fast",
@@ -220,7 +219,7 @@ Chart case_panels(const RunsByCase& all, Over over) {
   return chart;
 }
 
-// Of a method over all motions with steps of 1 ms: what it errs by at most, and what its steps take.
+// A method over all motions with steps of 1 ms: its largest error, and the times of its steps.
 struct Worst {
   double error_m = 0.0, least_ns = std::numeric_limits<double>::infinity(), most_ns = 0.0;
 };
@@ -236,7 +235,7 @@ Worst worst_of(const RunsByCase& all, Method method) {
   return worst;
 }
 
-// The penalty method that errs least where it errs most.
+// The penalty method whose largest error is smallest.
 Method best_penalty(const RunsByCase& all) {
   Method best = penalty_euler;
   for (const Method method : {penalty_rk4, penalty_implicit}) {
@@ -251,28 +250,26 @@ std::string nanoseconds(const Worst& worst) {
   return count_text(worst.least_ns) + " to " + count_text(worst.most_ns) + " ns";
 }
 
-// "semi-implicit Euler", of a penalty method.
+// A penalty method's name, for example "semi-implicit Euler".
 std::string short_title(Method method) {
   const std::string title = method_titles[method];
   return title.substr(title.find(", ") + 2);
 }
 
-// What the smaller error costs.
 std::string step_answer(const RunsByCase& all) {
   const Method rival = best_penalty(all);
   return "A step of order 2 takes " + nanoseconds(worst_of(all, order_2)) + ", of " + short_title(rival) + " " +
          nanoseconds(worst_of(all, rival));
 }
 
-// Where a method's mark stands among those of a motion.
 double place_of(std::size_t motion, std::size_t method) {
   return static_cast<double>(motion) + 0.13 * (static_cast<double>(method) - 2.5);
 }
 
-// Motions by their names, from left to right.
+// Motions by name, numbered from left to right.
 using Places = std::map<std::string, std::size_t>;
 
-// Two panels of the motions side by side, every other one shaded.
+// Two panels of the motions side by side, every other motion shaded.
 struct Glance {
   Panel error, time;
   Places places{};
@@ -305,7 +302,6 @@ Glance empty_glance(const RunsByCase& all) {
   return glance;
 }
 
-// A method's marks.
 void add_method(const RunsByCase& all, std::size_t method, Glance& glance) {
   Curve error{
       .name = method_titles[method], .style = static_cast<int>(method), .marks = true, .line = false, .mark_size = 1.1};

@@ -1,4 +1,4 @@
-// The error study's plots, and the sentences that they answer with.
+// The error study's plots, and their titles, which state the result.
 #pragma once
 
 #include <filesystem>
@@ -10,13 +10,13 @@
 
 namespace proxarm::studies {
 
-// In how many motions order 2 needs less time for the same error than the best of the others, each tuned to the motion.
+// In how many motions order 2 needs less time for the same error than the best other method, each tuned to the motion.
 std::string work_answer(const RunsByCase& all);
 
-// In how many motions each order is as accurate as it promises: exact, or with an error that falls by T² or faster.
+// In how many motions each order keeps its promise: exact, or an error that falls by T² or faster.
 std::string order_answer(const RunsByCase& all);
 
-// With steps of 1 ms: what order 2 errs by at most, and what the best penalty method does.
+// The largest error with steps of 1 ms, for order 2 and for the best penalty method.
 std::string glance_answer(const RunsByCase& all);
 
 // Writes error.svg, error_order.svg and error_at_1ms.svg. Returns warnings.

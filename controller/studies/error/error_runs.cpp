@@ -17,7 +17,7 @@ std::vector<double> targets() {
   return list;
 }
 
-// The run with the least run time for that error; nullptr where none reaches it.
+// The runs with the least run time for that error; nullptr if none reach it.
 const Runs* cheapest(const std::vector<const Runs*>& list, double target) {
   const Runs* best = nullptr;
   for (const Runs* runs : list) {
@@ -57,7 +57,7 @@ double tuned_cost(const std::vector<Runs>& list, double target) {
 bool matches(const Fixed& fixed, const Runs& runs) {
   if (runs.method != fixed.method) return false;
   if (runs.tuning.staggered != fixed.tuning.staggered) return false;
-  // Cases without friction or surfaces have less to tune.
+  // Cases without friction or surfaces have fewer parameters.
   const bool k = runs.tuning.stiffness_N_per_m == fixed.tuning.stiffness_N_per_m,
              c = runs.tuning.damping_ratio == fixed.tuning.damping_ratio;
   return k && c && (runs.tuning.friction_slope == fixed.tuning.friction_slope || runs.tuning.friction_slope == 1.0);
@@ -78,7 +78,7 @@ std::size_t Runs::at_1_ms() const {
   throw std::out_of_range("no run with steps of 1 ms of " + method);
 }
 
-// A step's time is its share of that of (26), which was measured in turn with it, times the least that one took.
+// A step's time is its ratio to a step of (26), measured alternately, times the least time of that step.
 RunsByCase collect(const Table& table) {
   RunsByCase all;
   std::map<std::string, double> reference_ns;

@@ -1,4 +1,4 @@
-// What the error study's table says: run times for an error, orders of convergence, and which penalty method is best.
+// Evaluates the error study's table: run times for an error, orders of convergence, and the best penalty method.
 #pragma once
 
 #include <map>
@@ -17,12 +17,13 @@ struct Runs {
   std::vector<double> T{}, steps{};
   std::vector<Spread> error{};
   std::vector<double> cost_ns{};
-  double timing_low = 1.0, timing_high = 1.0;  // marks of a tenth and nine tenths of the step times, by their median
+  double timing_low = 1.0,
+         timing_high = 1.0;  // tenth and ninetieth percentile of the step times, divided by their median
 
-  // Run time for an error that nine of ten phases keep below `target`, with that timestep and all finer ones; infinite
-  // where none is that good.
+  // Run time for an error that nine of ten phases keep below `target`, at that timestep and all finer ones; infinite if
+  // no timestep reaches it.
   [[nodiscard]] double cost(double target) const;
-  // The run with steps of 1 ms. Throws std::out_of_range where there is none.
+  // The run with steps of 1 ms. Throws std::out_of_range if there is none.
   [[nodiscard]] std::size_t at_1_ms() const;
 };
 
@@ -32,7 +33,7 @@ RunsByCase collect(const Table& table);
 
 inline bool is_penalty(const Runs& runs) { return runs.method != "1" && runs.method != "2"; }
 
-// The first runs of a method. Throws std::out_of_range where there are none.
+// The first runs of a method. Throws std::out_of_range if there are none.
 const Runs& runs_of(const std::vector<Runs>& list, const std::string& method);
 
 // A penalty method with one tuning for all cases.
@@ -41,28 +42,28 @@ struct Fixed {
   Tuning tuning{};
 };
 
-// The method and tuning that is best over all cases together at 0.1 mm: the one with the least geometric mean of run
-// times. A case in which it doesn't reach 0.1 mm counts as a thousand times the best-tuned one's time.
+// The method and tuning with the least geometric mean of run times for 0.1 mm over all cases. If it doesn't reach 0.1
+// mm in a case, that case counts as a thousand times the time of its best-tuned method.
 Fixed best_fixed(const RunsByCase& all);
 
-// Its runs among those of a case, which may have less to tune; nullptr where there are none.
+// The fixed method's runs for a case, which may have fewer parameters to tune; nullptr if there are none.
 const Runs* fixed_runs(const std::vector<Runs>& list, const Fixed& fixed);
 
-// The best of the penalty methods at 0.1 mm.
+// The best penalty method for 0.1 mm.
 const Runs& best_tuned(const std::vector<Runs>& list);
 
-// The other methods' run time over ours at equal error, median over the errors that both reach: whatever is best for
-// that error, or one method alone. Low and high: the same with what the step times scatter by against and for us.
+// The other methods' run time divided by ours at equal error; median over the errors that both reach. `rivals`: the
+// best of them for each error. Low and high include the scatter of the step times against us and for us.
 Spread speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals);
 Spread speedup_over(const Runs& ours, const Runs& rival);
 
-// Of a method on a case: the run with steps of 1 ms whose tuning errs least there. Infinite where none ends.
+// A method's run with steps of 1 ms, with the tuning that errs least there. The error is infinite if no run ends.
 struct AtOneMs {
   double error_m = 0.0, step_ns = 0.0;
 };
 AtOneMs best_at_1_ms(const std::vector<Runs>& list, const std::string& method);
 
-// Slope of log error over log T, where the error is above rounding, and the rms of what is left, in decades.
+// Slope of log error over log T where the error is above rounding; and the rms of the residuals, in decades.
 struct Fit {
   double order = 0.0, residual = 0.0;
 };

@@ -7,7 +7,7 @@ namespace proxarm::studies {
 using models::Mat3;
 using models::Vec3;
 
-// Where a surface is seen from q: its height below q, its normal n, and ∂n/∂q = bend (1 − n nᵀ).
+// A surface as seen from q: q's height above it (negative inside), its normal n, and ∂n/∂q = bend (1 − n nᵀ).
 struct PenaltyWorld::Touch {
   double height;
   Vec3 n;
@@ -53,7 +53,8 @@ Vec3 PenaltyWorld::force(const Vec3& q_0, double T, const Vec3& v, Mat3& slope) 
   return f;
 }
 
-// Adds one surface's force, and its derivative by v where q moves with it: ∂q/∂v = T, so ∂n/∂v = T bend (1 − n nᵀ).
+// Adds one surface's force, and its derivative with respect to v while q moves with v: ∂q/∂v = T, so ∂n/∂v = T bend (1
+// − n nᵀ).
 void PenaltyWorld::press(const Touch& at, double T, const Vec3& v, Vec3& f, Mat3* slope) const noexcept {
   const Vec3& n = at.n;
   const double v_n = n.dot(v), f_n = -k_ * at.height - c_ * v_n;

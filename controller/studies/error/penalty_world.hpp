@@ -1,8 +1,7 @@
-// The world as springs, dampers and friction dampers: what stands for ℳ in the penalty methods of the error study.
+// The world of the error study's penalty methods, in place of ℳ: springs, dampers and friction dampers.
 //
-// A wall pushes by its depth and by the speed into it, and never pulls; friction is a damper up to μ f_n. Distances,
-// normals and derivatives are those of the plane or sphere itself, in closed form: nothing is asked that such a method
-// could do without.
+// A wall pushes in proportion to the depth and to the speed into it, and never pulls; friction is a damper up to μ f_n.
+// Distances, normals and derivatives of the plane or sphere are in closed form, so a step does no unnecessary work.
 #pragma once
 
 #include <vector>
@@ -14,7 +13,7 @@ namespace proxarm::studies {
 // The parameters of a penalty method.
 struct Tuning {
   double stiffness_N_per_m = 0.0, damping_ratio = 0.0, friction_slope = 1.0;
-  // The velocity begins half a step before the position, as leapfrog has it.
+  // The velocity starts half a step before the position, as in leapfrog.
   bool staggered = false;
 
   bool operator==(const Tuning&) const = default;
@@ -27,7 +26,7 @@ class PenaltyWorld {
   // The force on the tool at q with velocity v.
   [[nodiscard]] models::Vec3 force(const models::Vec3& q, const models::Vec3& v) const noexcept;
 
-  // The force at q₀ + T v with velocity v, and its derivative by v.
+  // The force at q₀ + T v with velocity v, and its derivative with respect to v.
   [[nodiscard]] models::Vec3 force(const models::Vec3& q_0, double T, const models::Vec3& v,
                                    models::Mat3& slope) const noexcept;
 

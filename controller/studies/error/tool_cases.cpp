@@ -10,7 +10,7 @@ namespace {
 using models::Vec3;
 using models::Wrench;
 
-// Of the centre in the plane, and the angle about y, each with its derivatives.
+// The centre's position in the plane and the angle about y; also used for their derivatives.
 struct Planar {
   double x = 0.0, z = 0.0, angle = 0.0;
 };
@@ -33,8 +33,8 @@ Pushed pushed(double t, double omega) {
           std::sin(omega * t)};
 }
 
-// A centre that goes about a place, at a distance d, under a constant force: φ'' = d (−sin φ F_x + cos φ F_z)/I, with I
-// about that place. Runge and Kutta's method, whose 400 steps leave 1e-13 rad.
+// A centre that turns about a fixed point at distance d under a constant force: φ'' = d (−sin φ F_x + cos φ F_z)/I,
+// with I about that point. Classical Runge-Kutta with 400 steps, whose error is 1e-13 rad.
 struct Swing {
   double d_m, inertia_kg_m2, force_x_N, force_z_N, from_rad;
 
@@ -93,7 +93,7 @@ ToolCase turn() {
   return out;
 }
 
-// Pulled at its centre, it accelerates with M + J/r².
+// Pulled at its centre, the ball accelerates with M + J/r².
 ToolCase roll() {
   ToolCase out{.name = "roll",
                .title = "a ball rolls",
@@ -110,7 +110,7 @@ ToolCase roll() {
   return out;
 }
 
-// It slides at first, and is spun up by its friction until it rolls.
+// The ball slides at first; friction spins it up until it rolls.
 ToolCase skid() {
   ToolCase out{.name = "skid",
                .title = "a ball slides until it rolls",
@@ -128,7 +128,7 @@ ToolCase skid() {
   return out;
 }
 
-// Pushed at the middle, it turns about the edge that it tips over.
+// Pushed at its middle, the box turns about the edge over which it tips.
 ToolCase tip() {
   constexpr double half_m = 0.03, high_m = 0.04;
   ToolCase out{.name = "tip",
@@ -143,7 +143,7 @@ ToolCase tip() {
   return out;
 }
 
-// From a tilt of 0.2 rad it falls onto its face, so wide that it rests at once.
+// The box falls from a tilt of 0.2 rad onto its face, which is so wide that the box rests at once.
 ToolCase fall() {
   constexpr double half_m = 0.06, high_m = 0.02, press_N = 2.0;
   ToolCase out{.name = "fall",
@@ -166,7 +166,7 @@ ToolCase fall() {
   return out;
 }
 
-// Without friction, one end on the floor and one on the wall: its middle goes on a circle.
+// Without friction, one end on the floor and one on the wall, so the middle moves on a circle.
 ToolCase ladder() {
   constexpr double length_m = 0.2, radius_m = 0.01;
   ToolCase out{.name = "ladder",

@@ -1,7 +1,7 @@
-// Motions of a rigid tool whose exact solution is known: what the study of its errors compares with.
+// Motions of a rigid tool whose exact solutions are known, for the study of its errors.
 //
-// All of them lie in the plane y = 0 of W, with rotations about y; a step of 𝒢 isn't told so. Metres, kilograms,
-// newtons, seconds. The tool's reference point is its centre of mass.
+// All lie in the plane y = 0 of W, with rotations about y; 𝒢 doesn't know that. Units are m, kg, N, s. The tool's
+// reference point is its centre of mass.
 #pragma once
 
 #include <functional>
@@ -28,7 +28,7 @@ struct ToolCase {
   std::function<ToolState(double)> exact{};
 };
 
-// Each lasts so long.
+// Duration of each motion.
 inline constexpr double tool_case_s = 0.96;
 
 std::vector<ToolCase> tool_cases();

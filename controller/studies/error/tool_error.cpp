@@ -63,7 +63,7 @@ ToolRun run_from(const ToolCase& which, const models::PoseAlgorithm& world, int 
   return run;
 }
 
-// The least of some rounds.
+// The least time of several rounds.
 double step_ns(const ToolCase& which, const models::PoseAlgorithm& world, int steps) {
   const double T = tool_case_s / steps;
   double least = std::numeric_limits<double>::infinity();
@@ -156,7 +156,7 @@ json ToolErrorStudy::headline(const Table& table, const Options& /*options*/) co
 
 namespace {
 
-// How far a tool is from its exact motion at the timestep next to 1 ms, where that is most.
+// The largest error at the timestep nearest to 1 ms, and its motion.
 struct WorstTool {
   double period_s = 0.0, error = 0.0;
   std::string motion{};
@@ -185,7 +185,7 @@ std::string motion_title(const std::string& name) {
   return name;
 }
 
-// An error of so little is rounding, and drawn below.
+// Errors below least_tool_error are rounding and drawn at drawn_least.
 constexpr double least_tool_error = 1e-10, drawn_least = 2.5e-12, tool_bottom = 1e-12;
 
 Panel tool_panel(const Table& table, const char* error, const char* title, const char* unit) {
@@ -203,7 +203,7 @@ Panel tool_panel(const Table& table, const char* error, const char* title, const
               .y_spans = {{tool_bottom, least_tool_error, "rounding"}}};
   int style = 0;
   for (const ToolCase& which : tool_cases()) {
-    // The first one is larger, since others may lie upon it.
+    // Larger, since other curves may lie on the first one.
     Curve curve{.name = which.title, .style = style, .marks = true, .mark_size = style == 0 ? 1.5 : 0.9};
     ++style;
     for (std::size_t row = 0; row < table.rows(); ++row) {

@@ -1,10 +1,10 @@
-// How exact (26) is for a rigid tool, and what a step takes: motions whose exact solution is known (tool_cases.hpp),
-// with steps of 16 ms to 0.125 ms.
+// Measures the error of (26) for a rigid tool and the time of a step, on motions with known exact solutions
+// (tool_cases.hpp), with steps of 16 ms to 0.125 ms.
 //
-// Error: rms over all steps of how far the reference point is off, and by what angle the tool is. The proxy gets the
-// hand's wrench at the samples and nothing between them; its pose q(k), made of h(t_k), stands for t_{k+1}, and its
-// first velocity for half a step before the start. Where an event falls within a step is chance: each run is repeated
-// with beginnings spread over a step, and the median counts.
+// Error: rms over all steps of the reference point's distance and of the tool's angle from the exact motion. The proxy
+// gets the hand's wrench at the samples only. Its pose q(k), made from h(t_k), belongs to t_{k+1}, and its first
+// velocity to half a step before the start. The place of an event within a step is chance, so each run is repeated with
+// starts spread over a step, and the median counts.
 #pragma once
 
 #include "controller/studies/common/study.hpp"
@@ -23,7 +23,7 @@ class ToolErrorStudy final : public Study {
   std::string text(const nlohmann::json& headline) const override;
 };
 
-// The plot's title: what a tool errs by at most with steps of 1 ms, and in which motion.
+// The plot's title: the largest error of a tool with steps of 1 ms, and in which motion.
 std::string tool_error_answer(const Table& table);
 
 }  // namespace proxarm::studies

@@ -1,4 +1,4 @@
-// A convex globe of flat triangles, as studies render it.
+// Makes the convex globe of flat triangles that studies render.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,7 @@
 
 namespace proxarm::studies {
 
-// Of `rings` >= 2 steps from pole to pole (± z) and `sectors` >= 3 around; `place` says where a point of the unit
-// sphere goes.
+// `rings` ≥ 2 steps from pole to pole (± z), `sectors` ≥ 3 around; `place` maps points of the unit sphere.
 scenes::MeshShape globe_mesh(std::uint32_t rings, std::uint32_t sectors,
                              const std::function<models::Vec3(const models::Vec3&)>& place);
 

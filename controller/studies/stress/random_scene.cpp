@@ -48,7 +48,6 @@ Shape some_edged(Random& random, const Vec3& at, bool inside_out) {
   return scenes::CylinderShape{at - half, at + half, 0.5 * random.uniform(low, high), inside_out};
 }
 
-// A convex globe of flat faces.
 Shape some_mesh(Random& random) {
   const auto rings = static_cast<std::uint32_t>(2 + random.below(4)),
              sectors = static_cast<std::uint32_t>(3 + random.below(8));
@@ -57,7 +56,7 @@ Shape some_mesh(Random& random) {
   return globe_mesh(rings, sectors, [&](const Vec3& x) { return Vec3(pose * Vec3(half.cwiseProduct(x))); });
 }
 
-// A globe whose faces turn inwards here and there, star-shaped about its middle.
+// A globe with dents, star-shaped about its middle.
 Shape some_concave_mesh(Random& random) {
   const auto rings = static_cast<std::uint32_t>(3 + random.below(5)),
              sectors = static_cast<std::uint32_t>(4 + random.below(8));

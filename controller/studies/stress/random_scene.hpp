@@ -1,4 +1,4 @@
-// Worlds composed at random, for studies that want any world.
+// Draws random worlds for the studies.
 #pragma once
 
 #include <string>
@@ -17,11 +17,10 @@ struct RandomScene {
 
 RandomScene random_scene(Random& random);
 
-// Worlds of meshes: concave ones, and any that move (kinds concave_mesh, moving_mesh), half of them with another
-// object.
+// Worlds of meshes: concave ones and moving ones (kinds concave_mesh, moving_mesh), half of them with another object.
 RandomScene random_mesh_scene(Random& random);
 
-// Two to five objects of which most have elastic layers, some of them moving (kinds layers, moving_layers).
+// Two to five objects, most of them with elastic layers, some of them moving (kinds layers, moving_layers).
 RandomScene random_layer_scene(Random& random);
 
 }  // namespace proxarm::studies

@@ -18,7 +18,7 @@ using nlohmann::json;
 
 double number(std::int64_t value) { return static_cast<double>(value); }
 
-// Of a column, over all runs or those in worlds of one kind.
+// Sum of a column over all runs, or over those in worlds of one kind.
 std::int64_t sum(const Table& table, const char* name, const std::string& kind = {}) {
   const std::size_t column = table.column(name), kinds = table.column("kind");
   double total = 0.0;
@@ -59,7 +59,6 @@ json failing(const Table& table) {
   return runs;
 }
 
-// What the headline's figures mean.
 json keys(const std::string& study) {
   return {
       {"runs", "worlds, each with a proxy of its own; a run that found no free place has no steps"},
@@ -156,7 +155,7 @@ std::int64_t violations_in(const Table& table) {
   return violations;
 }
 
-// How far one step's force would carry the proxy, T²F/M: decades, of which each run belongs to one.
+// A decade of T²F/M, the distance by which one step's force would move the proxy. Each run belongs to one.
 struct Bin {
   double push_m = 0.0, steps = 0.0, violations = 0.0;
   std::array<double, 2> met{};
@@ -183,7 +182,7 @@ std::vector<Bin> bins_of(const Table& table) {
   return bins;
 }
 
-// How many steps of all broke each of the laws, and how many are counted apart. None stand at the bottom.
+// The number of steps that broke each law, and of steps that are counted separately. 0 is drawn at the bottom.
 Panel counts_panel(const Table& table) {
   constexpr double none = 0.5;
   constexpr std::array names{"numbers finite", "nothing inside",    "law of contact", "any stiffness",
@@ -202,7 +201,7 @@ Panel counts_panel(const Table& table) {
               .y_low = 0.2,
               .y_high = 10.0 * steps,
               .levels = {{steps, "all steps"}}};
-  std::array<Curve, 3> curves;  // of laws, and as the panel below has them
+  std::array<Curve, 3> curves;  // of laws; and as in the panel below
   constexpr std::array styles{0, 5, 3};
   for (std::size_t i = 0; i < curves.size(); ++i) {
     curves[i] = {.style = styles[i], .marks = true, .line = false, .mark_size = 1.5};
@@ -219,7 +218,7 @@ Panel counts_panel(const Table& table) {
   return panel;
 }
 
-// Shares of steps, by how far they would go. Where no step broke a law, the share that is excluded with 95 %, 3/n.
+// Shares of steps by distance. If no step broke a law: the share that is excluded with 95 % confidence, 3/n.
 Panel stress_panel(const Table& table) {
   Panel panel{.title = "The last two, by how far the force would carry the proxy",
               .x_label = "T²F/M (m)",

@@ -1,22 +1,21 @@
-// Random worlds under random forces, and what must hold at every step whatever they are.
+// The stress study: random worlds under random forces, and invariants that must hold at every step.
 //
-// A run: a world composed at random, a proxy of 1 g to 1 t with a timestep of 10 µs to 50 ms, order 1 or 2, forces up
-// to 1e6 N (steady, noise, jumps, sines, random walks, towards an object), 1000 steps. After each step, with q the
-// previous proxy as 𝒢 was given it, r the new one and f = κ(r − p̂):
-//   finite          r and f are
-//   inside          r is nowhere inside of an object (by more than rounding)
-//   law             f lies in the sum of the friction cones of the contacts that are reported, against the slip (17):
-//                   nothing pulls, nothing leaves its cone
+// A run has a random world and a proxy of 1 g to 1 t, a timestep of 10 µs to 50 ms, order 1 or 2, forces up to 1e6 N
+// (steady, noise, jumps, sines, random walks, towards an object), and 1000 steps. After each step, q is the previous
+// proxy as 𝒢 got it, r the new one and f = κ(r − p̂):
+//   finite          r and f are finite
+//   inside          r is not inside an object (by more than rounding)
+//   law             f lies in the sum of the reported contacts' friction cones, against the slip (17): no contact
+//                   pulls or leaves its cone
 //   stiffness       𝒢(κ', r − f/κ', q) = r for another κ' (Assumption 1)
 //   work            fᵀ(r − q) ≤ f_n ‖r − q‖²/(2R) on one convex surface of radius R, and ≤ 0 on flat and concave ones
-// These are counted apart and are no violations:
-//   unresolved      steps in which 𝒢 itself says that no set of contacts was complete (a squeeze, a jam)
-//   several         another κ' gave another point that obeys (17) as well: Coulomb's law has several solutions there
-//   edge            work on the edges of boxes, cylinders and meshes, where R is zero
-//   not judged      work with several contacts of which one is convex, with objects that move (they do work), with
-//                   layers (they give back what they took), and steps of order 2 that ask 𝒢 from another point than
-//                   where the proxy was
-// Rigid tools are judged by the same names, with runs and laws of their own (tool_run.hpp).
+// These steps are counted separately and are no violations:
+//   unresolved      𝒢 itself reports that no set of contacts was complete (a squeeze, a jam)
+//   several         another κ' gave another point that obeys (17): Coulomb's law has several solutions there
+//   edge            work on edges of boxes, cylinders and meshes, where R is 0
+//   not judged      work with several contacts of which one is convex; with moving objects, which do work; with layers,
+//                   which return energy; and of order 2 if it starts 𝒢 from a point other than the proxy's
+// Rigid tools are judged by invariants of the same names, with their own runs and laws (tool_run.hpp).
 #pragma once
 
 #include <array>
@@ -45,14 +44,14 @@ class Stress final : public Study {
   std::string text(const nlohmann::json& headline) const override;
   bool failed(const nlohmann::json& headline) const override;
 
-  // One run alone, by its own seed: what it was made of, and each violation with its state. True if there was one.
+  // Repeats one run by its seed: reports its composition, and each violation with its state. True if there was one.
   static bool replay(std::uint64_t run_seed, std::string& text, Worlds worlds = Worlds::all);
 
  private:
   Worlds worlds_;
 };
 
-// The plot's title: how many steps broke a law, and how many weren't judged.
+// The plot's title: the number of steps that broke a law, and of steps that weren't judged.
 std::string stress_answer(const Table& table);
 
 }  // namespace proxarm::studies

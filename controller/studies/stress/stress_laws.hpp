@@ -1,4 +1,4 @@
-// What is known of the forces of a world, whatever its 𝒢: the judge's own copy of the laws, for the stress study.
+// The judge's own copy of the laws of contact forces, which hold for any 𝒢, for the stress study.
 #pragma once
 
 #include <cstddef>
@@ -11,13 +11,13 @@
 
 namespace proxarm::studies {
 
-// One call of 𝒢, as the proxy made it.
+// One call of 𝒢 by the proxy.
 template <int N>
 struct Call {
   double K = 0.0;
   models::Vec<N> p = models::Vec<N>::Zero(), q = models::Vec<N>::Zero(), r = models::Vec<N>::Zero();
   models::StepTime time;
-  std::vector<models::Vec3> carried;  // q, by objects' motion: where 𝒢 begins, of meshes at order 2
+  std::vector<models::Vec3> carried;  // q moved with each object: where 𝒢 starts for meshes at order 2
   std::vector<models::Contact<N>> contacts;
   bool unresolved = false;
 
@@ -25,7 +25,7 @@ struct Call {
   [[nodiscard]] double size() const { return 0.1 + r.norm() + p.norm() + q.norm() + (r - p).norm(); }
 };
 
-// By how much the contacts' geometry amplifies rounding.
+// The factor by which the contacts' geometry amplifies rounding.
 template <int N>
 double condition(const Call<N>& call) {
   return models::rounding_amplification<N>(call.contacts);
@@ -44,8 +44,8 @@ class Laws {
     return scene_.guide && scene_.guide->kind == scenes::GuideDescription::Kind::polyline;
   }
 
-  // f of the objects alone: what media take is known, but for a Coulomb medium's force, whose size is returned. K with
-  // what viscous media add to it.
+  // The force f of the objects alone: the known force of the media is subtracted, except for a Coulomb medium's, whose
+  // size is returned. K includes the viscous media.
   struct ObjectForce {
     models::Vec3 f;
     double coulomb_N = 0.0, K = 0.0;
@@ -53,20 +53,20 @@ class Laws {
   template <int N>
   [[nodiscard]] ObjectForce without_media(const Call<N>& call) const;
 
-  // (17): how far f is from what the contacts can bear, as yes or no.
+  // Whether the contacts can bear f by (17).
   template <int N>
   [[nodiscard]] bool obeyed(const Call<N>& call) const;
 
-  // How far the objects have been carried, metres: their places are rounded by that.
+  // How far the objects have been moved, m; their places are rounded in proportion.
   [[nodiscard]] double carriage(double time_s) const;
 
-  // Where the object's motion takes q.
+  // Returns q moved with the object.
   [[nodiscard]] models::Vec3 carried(std::size_t object, const models::StepTime& time, const models::Vec3& q) const;
 
-  // How deep r is inside of anything, metres.
+  // Depth of r inside the objects, m.
   [[nodiscard]] double depth(const models::Vec3& r, double time_s) const;
 
-  // What a surface's curvature lets f do on the proxy.
+  // Curvature of a surface, which limits the work of f on the proxy.
   enum class Curvature { flat_or_concave, convex, edged };
   [[nodiscard]] Curvature curvature(std::size_t object, double& radius_m) const;
 
@@ -74,7 +74,7 @@ class Laws {
   const scenes::Scene& scene_;
   bool moving_ = false, meshes_ = false;
   std::vector<models::ScriptedMotion> scripts_;
-  std::vector<bool> convex_;  // meshes
+  std::vector<bool> convex_;  // of meshes
 };
 
 }  // namespace proxarm::studies

@@ -1,5 +1,5 @@
-// One run of the stress study (stress.hpp): a world, a proxy and a force in it, all of them drawn by the run's seed,
-// and what came of its steps.
+// Runs the stress study once (stress.hpp): draws a world, a proxy and a force from the run's seed, and judges the
+// steps.
 #pragma once
 
 #include <array>
@@ -8,9 +8,9 @@
 
 namespace proxarm::studies {
 
-// Which worlds: those of random_scene(), random_mesh_scene() or random_layer_scene(), each a study of its own, so that
-// what a seed gives in the one stays what it was. order_2: those of random_scene(), all stepped by order 2. tools:
-// rigid tools in those of random_tool_scene() (tool_run.hpp); moving_tools: the same, set in motion.
+// The worlds: random_scene(), random_mesh_scene() or random_layer_scene(). Each is its own study, so that a change of
+// one doesn't change the others' worlds. order_2: random_scene() with order 2 only. tools: rigid tools in
+// random_tool_scene() (tool_run.hpp); moving_tools: the same in motion.
 enum class StressWorlds { all, meshes, layers, order_2, tools, moving_tools };
 
 enum Invariant { finite, inside, law, stiffness, work, invariant_count };
@@ -37,7 +37,7 @@ struct Tally {
   }
 };
 
-// `report`, if there is one, is given a line for each violation.
+// `report`, if not null, gets a line for each violation.
 Tally run_seed(std::uint64_t seed, StressWorlds worlds, std::string* report);
 
 }  // namespace proxarm::studies

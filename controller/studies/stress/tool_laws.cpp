@@ -18,12 +18,12 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-constexpr double kSlips_m = 1e-9;   // a million roundings of a way
-constexpr double kShort_m = 1e-12;  // of a gap
+constexpr double kSlips_m = 1e-9;   // smallest slip that must be reported: a million roundings of a displacement
+constexpr double kShort_m = 1e-12;  // largest amount by which a gap may fall short of 0
 constexpr double beyond_all_m = std::numeric_limits<double>::infinity();
 
-// The least of a distance along a segment, by the golden section; where it is `enough` or more, some bound of that. (It
-// is convex, and grows by no more than one goes along.)
+// The least distance f along a segment, by golden-section search; if it is at least `enough`, returns some lower bound
+// that is at least `enough`. Precondition: f is convex and changes by at most the length moved.
 template <typename Distance>
 double least_along(const Vec3& a, const Vec3& b, Distance f, double enough = beyond_all_m) {
   if (a == b) return f(a);
@@ -64,12 +64,12 @@ double along(const std::vector<Vec3>& points, const Vec3& n, double& highest) {
   return lowest;
 }
 
-// From an edge that leads from a place by d.
+// Distance of p from an edge that leads from `from` by d.
 double to_edge(const Vec3& from, const Vec3& d, const Vec3& p) {
   return (p - from - std::clamp(d.dot(p - from) / d.squaredNorm(), 0.0, 1.0) * d).norm();
 }
 
-// The nearest point of a triangle, by the regions of its plane (Ericson, Real-Time Collision Detection, 5.1.5).
+// Distance of p from a triangle, by the regions of its plane (Ericson, Real-Time Collision Detection, 5.1.5).
 double to_triangle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
   const Vec3 ab = b - a, ac = c - a, bc = c - b;
   const Vec3 n = ab.cross(ac);
@@ -78,13 +78,13 @@ double to_triangle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
   return std::min({to_edge(a, ab, p), to_edge(a, ac, p), to_edge(b, bc, p)});
 }
 
-// Whether a contact may be one of an edge: it is on it, and the edge in the plane across its normal.
+// Whether a contact may belong to an edge: it lies on the edge, and the edge is perpendicular to its normal.
 bool lies_on(const PoseContact& contact, const Vec3& from, const Vec3& to, double within_m) {
   const Vec3 d = to - from;
   return std::abs(contact.normal_W.dot(d)) <= within_m && to_edge(from, d, contact.point_W) <= within_m;
 }
 
-// By how much K yields at a contact to a newton along a direction, m.
+// Compliance of K at a contact along a direction, m/N.
 double yields(const ToolCall& call, const PoseContact& contact, const Vec3& along) {
   Twist wrench;
   wrench << along, (contact.point_W - call.r.position).cross(along);
@@ -111,7 +111,7 @@ ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene
       for (int k = 0; k < 3; ++k) core.normals_T.emplace_back(Vec3::Unit(k));
       core.edges_T = core.normals_T;
     } else if (const auto* hull = std::get_if<models::ConvexTool>(&part.shape)) {
-      // All planes through three points that leave the others on one side, and all pairs as edges.
+      // All planes through three points with all others on one side, and all pairs of points as edges.
       core.corners_T = hull->points_m;
       for (std::size_t i = 0; i < hull->points_m.size(); ++i) {
         for (std::size_t j = i + 1; j < hull->points_m.size(); ++j) {
@@ -182,7 +182,7 @@ ToolLaws::Piece ToolLaws::triangle_of(const models::TriangleMesh& mesh, std::uin
   return piece_of(corners, normals, edges);
 }
 
-// Pairs of corners that are furthest along two normals, or against them (a box has one normal for two sides).
+// Pairs of corners that are both furthest along two normals, or against them (a box has one normal for two sides).
 ToolLaws::Edges ToolLaws::sharp_edges_of(const Piece& piece) {
   std::vector<Vec3> faces;
   const auto is_far = [&](const Vec3& x, const Vec3& n) {
@@ -215,7 +215,7 @@ ToolLaws::Edges ToolLaws::sharp_edges_of(const models::TriangleMesh& mesh) {
   for (std::uint32_t f = 0; f < mesh.size(); ++f) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t from = mesh.triangle(f)[k], to = mesh.triangle(f)[(k + 1) % 3];
-      if (from < to) out.emplace_back(mesh.vertex(from), mesh.vertex(to));  // the other side has it the other way
+      if (from < to) out.emplace_back(mesh.vertex(from), mesh.vertex(to));  // the other face has it in reverse
     }
   }
   return out;
@@ -230,8 +230,8 @@ ToolLaws::Piece ToolLaws::moved(const Piece& piece, const ToolPose& pose) {
   return out;
 }
 
-// Whether two balls are so far from each other that what is in them needn't be looked at. The least gap so far is
-// lowered to theirs.
+// Whether two balls are so far apart that their contents needn't be examined. Lowers the least gap to the balls'
+// distance.
 bool ToolLaws::are_clear(const Vec3& a, double a_reach_m, const Vec3& b, double b_reach_m, double& gap) {
   const double clear = (a - b).norm() - a_reach_m - b_reach_m;
   if (!(clear > clear_m || clear >= gap)) return false;
@@ -239,7 +239,7 @@ bool ToolLaws::are_clear(const Vec3& a, double a_reach_m, const Vec3& b, double 
   return true;
 }
 
-// The separation by all axes; of pieces that are `enough` apart by some of them, no more than by those.
+// The largest separation over all axes. If some axes already separate the pieces by `enough`, a lower bound.
 double ToolLaws::between_m(const Piece& a, const Piece& b, double enough) {
   double gap = enough;
   if (are_clear(a.middle, a.reach_m, b.middle, b.reach_m, gap)) return gap;
@@ -261,8 +261,8 @@ double ToolLaws::between_m(const Piece& a, const Piece& b, double enough) {
   return gap;
 }
 
-// From what is around a segment by a radius; where balls or one of the triangle's normals part the two by `enough`, no
-// more than by that.
+// Distance of a triangle from a segment with a radius. If balls or one of the triangle's normals separate them by
+// `enough`, a lower bound.
 double ToolLaws::from_segment_m(const Piece& triangle, const Vec3& from, const Vec3& to, double radius, double enough) {
   double gap = enough;
   if (are_clear(triangle.middle, triangle.reach_m, 0.5 * (from + to), 0.5 * (to - from).norm() + radius, gap))
@@ -279,15 +279,16 @@ double ToolLaws::from_segment_m(const Piece& triangle, const Vec3& from, const V
          radius;
 }
 
-// Of a mesh, as tool or as object, that is met by something with a volume; planes are met by corners.
+// Distance between a mesh, as tool or object, and a shape with a volume. Planes are tested with corners instead.
 double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_t index) const {
   const scenes::Object& object = scene_.objects[index];
   const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape);
   const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape);
   const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape);
   double gap = beyond_all_m;
-  // One all inside of the other: as deep as it is small. With all of its corners: one that touches from outside is on
-  // either side by rounding. (Replay 5924495204300528, step 31, a box with its first corner on the tool.)
+  // If one lies entirely inside the other, the depth is the size of the smaller one. All corners must be inside: one
+  // that touches from outside may be on either side by rounding (replay 5924495204300528, step 31: a box whose first
+  // corner is on the tool).
   const auto all_in = [](const models::TriangleMesh& around, const std::vector<Vec3>& points, const auto& place) {
     return std::all_of(points.begin(), points.end(), [&](const Vec3& x) { return around.encloses(place(x)); });
   };
@@ -348,7 +349,7 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
   if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape)) {
     return least_along(capsule->from_m, capsule->to_m, to_box) - capsule->radius_m;
   }
-  // Of two convex polyhedra the separation by all of their axes.
+  // Between two convex polyhedra, the largest separation over all their axes.
   const auto& box = std::get<scenes::BoxShape>(object.shape);
   std::vector<Vec3> corners, axes;
   for (const Vec3& x : core.corners_T) corners.emplace_back(pose * x);
@@ -371,7 +372,7 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
   return gap;
 }
 
-// The text of a script: c + R(ωt)(x − c) + vt + a sin(2πft + φ), R by Rodrigues' formula.
+// The formula of a script: c + R(ωt)(x − c) + vt + a sin(2πft + φ), with R by Rodrigues' formula.
 models::Pose ToolLaws::place(std::size_t index, double time_s) const {
   models::Pose X = models::Pose::Identity();
   const std::optional<scenes::Motion>& motion = scene_.objects[index].motion;
@@ -409,7 +410,7 @@ std::vector<PoseContact> ToolLaws::carried(std::vector<PoseContact> contacts, do
   return contacts;
 }
 
-// Of a pose that is carried, too: by two places of the object, each known to as much.
+// With moving objects also the rounding of a moved pose, which comes from two poses of the object.
 double ToolLaws::rounding_of_ways_m(const ToolCall& call) const {
   return (moves_ ? 3.0 : 1.0) * 8.0 * rounding_m(call.r);
 }
@@ -455,29 +456,29 @@ std::string ToolLaws::missed(const ToolCall& call) const {
     sum.tail<3>() += (contact.point_W - call.r.position).cross(contact.force_W);
     size = std::max(size, contact.force_W.norm());
   }
-  // Where contacts hold each other, a local problem is solved to 1e-10 of a step.
+  // Where contacts press against each other, the local problem is solved to 1e-10 of a step.
   if (!((sum - call.wrench()).norm() <= 1e-9 * size + 16.0 * call.stiffest * rounding_m(call.r))) return "balance";
   for (const PoseContact& contact : call.contacts) {
     const Vec3 &f = contact.force_W, &n = contact.normal_W;
     const double f_n = n.dot(f);
     const Vec3 f_t = f - f_n * n;
     if (!(f_n >= -1e-12 * size)) return "a pull";
-    // A point on a hollow's wall is known to less, since its normal turns with it.
+    // A contact on a hollow's wall is less exact, since its normal turns with it.
     if (std::abs(contact.gap_m) > (hollow_ ? 1e-10 : 1e-12) && f_n > 1e-9 * size) return "a force over a gap";
     const double limit = friction(contact) * f_n;
-    // In hollow objects forces are as a local problem has them where contacts hold each other: to 1e-10 of the press,
-    // √(eᵀK e), which is a force by the contact's yield. Elsewhere what is out of the cone by that is taken off.
+    // In hollow objects contacts may press against each other, and their forces are exact to 1e-10 of √(eᵀK e),
+    // converted to a force by the contact's compliance. Elsewhere such an excess over the cone is removed.
     double beyond = 1e-11 * size;
     if (hollow_) {
       const Twist e = models::difference(call.r, call.p);
       beyond += 1e-10 * std::sqrt(e.dot(call.K * e) / yields(call, contact, n));
     }
     if (!(f_t.norm() <= limit + beyond)) return "out of the cone";
-    // A slip far below what friction would move the contact by is next to sticking: its direction counts as much less.
-    // And it is the difference of two places, known to ε = 8 roundings (both poses', and those of what rotates by them;
-    // up to 5 have been seen). A friction against s₀ = s − e, ‖e‖ ≤ ε, is off s by
+    // A slip much smaller than friction's displacement of the contact is nearly sticking, so its direction counts less.
+    // The slip is a difference of two places, exact to ε = 8 roundings (of both poses and of points rotated with them;
+    // up to 5 have occurred). Friction against s₀ = s − e, ‖e‖ ≤ ε, deviates from s by
     //   μ f_n ‖s/‖s‖ − s₀/‖s₀‖‖ ≤ 2 μ f_n ε/‖s‖
-    // and so is any that sticks, where s₀ = 0 and ‖s‖ ≤ ε.
+    // and so does any friction that sticks, where s₀ = 0 and ‖s‖ ≤ ε.
     const Vec3 slip = call.slip_of(contact);
     const double s = slip.norm();
     if (!(s > 0.0)) continue;
@@ -490,11 +491,11 @@ std::string ToolLaws::missed(const ToolCall& call) const {
   return {};
 }
 
-// As a sine, where that is more than the tool's own turn.
+// The sine of the normal's turn, if that is more than the tool's own turn.
 double ToolLaws::normal_turns(const ToolCall& call, const PoseContact& contact) const {
   const ToolPose& q = call.from(contact);
   double most = models::difference(call.r, q).tail<3>().norm();
-  // At either pose a gap may be short of 1e-12 m.
+  // At either pose a gap may fall short by 1e-12 m.
   const double within_m = 2e-12 + rounding_of_ways_m(call);
   const Vec3 &n = contact.normal_W, way = call.way_of(contact);
   const auto object = static_cast<std::size_t>(contact.object);
@@ -569,9 +570,9 @@ double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& e
     const auto met = [&](const PoseContact& was) {
       return was.object == contact.object && was.normal_W.dot(way) <= bent_m && cosine_of(was) > 0.0;
     };
-    // A normal turns where it is: of what touched the object before, what was as near as a place may have come, if
-    // there is such. (Replay 2305703389568219, step 172: one edge of the tool leaves a face of a mesh for the next
-    // face's edge, and others lie on that face already, elsewhere.)
+    // A normal turns locally, so of the earlier contacts with this object only those near enough for the point to have
+    // come from are used; if there are none, all are used. (Replay 2305703389568219, step 172: one edge of the tool
+    // moves from a mesh's face to the next face's edge, while other edges already lie on that face elsewhere.)
     const auto came = [&](const PoseContact& was) {
       return met(was) && (was.point_W - contact.point_W).norm() <= 2.0 * s;
     };

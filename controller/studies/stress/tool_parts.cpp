@@ -8,19 +8,19 @@
 namespace proxarm::studies {
 namespace {
 
-// In how many parts a way is divided first, one after the other.
+// Numbers of parts into which a path is first divided, tried in this order.
 constexpr std::array kFirst{8, 1, 3, 5, 7, 13, 29};
-constexpr double kLeast = 1e-12;  // of the way, or of a wait, a part
+constexpr double kLeast = 1e-12;  // least size of a part, as a share of the path or of a wait
 constexpr std::size_t kMost = 400;
-// A foot may lie so far beside its feature and count (touch.hpp, beside_m): before an edge by that, and behind it.
+// A contact point may lie this far beside its feature (touch.hpp, beside_m), before and behind an edge.
 constexpr double kBeside_m = 1e-10;
-// Off a point: ten times that. Contacts that are nearer to each other than so are at one.
+// Displacement from a point, ten times that. Contacts nearer to each other count as at one point.
 constexpr double kAside_m = 10.0 * kBeside_m;
-// Directions to put a tool aside. (Of replay 5693172070329278 a fifth leads away from its vertex: those that lead out
-// of the object, and to the other side of it.)
+// Number of directions in which a tool is displaced. In replay 5693172070329278 a fifth of them lead away from its
+// vertex: those out of the object and to the other side.
 constexpr int kAsides = 32;
 
-// Whether several contacts with an object press at one place.
+// Whether several contacts with one object press at one place.
 bool lies_on_point(const std::vector<models::PoseContact>& contacts) {
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
@@ -34,7 +34,7 @@ bool lies_on_point(const std::vector<models::PoseContact>& contacts) {
 
 }  // namespace
 
-// In the middle of two marks that follow each other: of the way, or of the wait at the second.
+// The middle between two successive marks: of the path, or of the wait at the second.
 std::optional<ToolParts::Mark> ToolParts::between(const Mark& a, const Mark& b) {
   if (b.share - a.share > kLeast) return Mark{0.5 * (a.share + b.share), 1.0};
   const double waited = a.share == b.share ? a.waited : 0.0;
@@ -42,8 +42,8 @@ std::optional<ToolParts::Mark> ToolParts::between(const Mark& a, const Mark& b) 
   return {};
 }
 
-// Where no forces were found for marks that follow a pose, closer to it, since a step that finds none may find some by
-// smaller ones; and where there are none next to it, in the widest gap.
+// Where to divide between two poses: close to the first one, if marks after it found no forces, since a smaller step
+// may find some; if nothing lies between, in the widest gap.
 std::optional<ToolParts::Mark> ToolParts::divide(const std::vector<Mark>& marks, const Mark& from, const Mark& to) {
   auto i = std::lower_bound(marks.begin(), marks.end(), from);
   if (const auto first = between(i[0], i[1])) return first;
@@ -88,7 +88,7 @@ void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, Goi
     const models::ToolPose start = from(last, going);
     next.call.p = models::moved(call.q, mark->share * models::difference(call.p, call.q));
     const double since = last.mark.share == mark->share ? last.mark.waited : 0.0, waited = mark->waited;
-    // h/(1 + h)
+    // η = h/(1 + h)
     const double drawn = waited == 1.0 ? 1.0 : (waited - since) / (waited - since + (1.0 - since) * (1.0 - waited));
     if (drawn < 1.0) next.call.p = models::moved(start, drawn * models::difference(next.call.p, start));
     next.call.time_s = time_of(call, *mark);

@@ -1,62 +1,61 @@
-// Whether a step whose contacts gave energy did so by going over an edge.
+// Judges whether a step whose contacts added energy did so by going over an edge.
 //
-// Over an edge the normal turns at once, and the force of the step's end, λn, counts for all of the way s from q, also
-// for what lay before the edge, where n₀ᵀs = 0 and nᵀs > 0. That is of the first order in s, and so is what a tool gets
-// that springs from a place by a fault of the step. The way tells them apart. p̂ comes straight from q, and a tool that
-// follows it, p̂(σ) = q + σ (p̂ − q), has poses r(σ) and forces f(σ), each found from the pose before it. Between two of
-// them, a and b,
+// At an edge the normal turns at once. The force at the step's end, λn, is multiplied by the whole displacement s from
+// q, also by the part before the edge, where n₀ᵀs = 0 and nᵀs > 0. This energy is of first order in s, as is that of a
+// tool that jumps by a fault in the step. The path from q to r tells the two apart. p̂ moves straight from q, p̂(σ) = q
+// + σ (p̂ − q), and a tool that follows it has poses r(σ) and forces f(σ), each found from the pose before. Between two
+// of these poses, a and b,
 //
-//   nᵀ(x(b) − x(a)) ≤ what the normal's turn and the surface's bend allow of the way from r(a) to r(b)
+//   nᵀ(x(b) − x(a)) ≤ what the normal's turn and the surface's curvature permit from r(a) to r(b)
 //
-// holds for each contact that presses at r(b), where no edge is between them: it either pressed at r(a), with a gap of
-// 0 at both, or came down to its feature since. It also holds for a jump from next before an edge, r⁻, to next behind
-// it, r⁺, if what holds the tool in r⁺ is met there first: in r⁻ the place lies on the edge, and so on what is behind
-// it. Its gap there is 0 at both, nᵀ(x⁺ − x⁻) = 0, and whatever else lets the tool go or comes to hold it meanwhile,
-// its gap is 0 at r⁺ if it presses, and was not below before. (So without friction the tool's potential ½‖r − p̂‖²_K
-// falls by ½‖r⁺ − r⁻‖²_K or more.)
+// holds for each contact that presses at r(b), if no edge lies between them: it either pressed at r(a), too, with a gap
+// of 0 at both, or its point came down to the feature meanwhile. The bound also holds for a jump from just before an
+// edge, r⁻, to just behind it, r⁺, if the feature that holds the tool at r⁺ is met at the edge. The contact point then
+// lies on the edge at r⁻, so its gap is 0 at both poses and nᵀ(x⁺ − x⁻) = 0. Any other contact that presses at r⁺ has a
+// gap of 0 there, and had none below 0 before. (So without friction the tool's potential ½‖r − p̂‖²_K falls by ½‖r⁺ −
+// r⁻‖²_K or more.)
 //
-// But let go at one edge a tool may come far, and over others: a vertex leaves its face, one of the tool's edges slides
-// along the object's to a corner, and over that onto a side that the place was behind in r⁻, beyond the edge (replay
-// 5381286054045804, step 12: 1 mm with p̂ as good as at rest, and up along the normal at r⁺ by 0.6). So a jump is a way,
-// too. There p̂ waits, and draws the tool on against a drag,
+// A tool released at one edge may move far, and over other edges. For example, a vertex leaves its face; one of the
+// tool's edges slides along the object's edge to a corner, and over it onto a side that the contact point was behind at
+// r⁻ (replay 5381286054045804, step 12: 1 mm, 0.6 mm of it along the normal at r⁺, while p̂ hardly moves). So a jump is
+// divided, too. During it p̂ waits and draws the tool against a drag,
 //
-//   K dr/dτ = K (p̂ − r) + what the contacts exert,   r(0) = r⁻,   r(∞) = r⁺
+//   K dr/dτ = K (p̂ − r) + the contacts' wrench,   r(0) = r⁻,   r(∞) = r⁺
 //
-// by steps of 𝒢 again: one of h has K (r(b) − p̂) + K (r(b) − r(a))/h for its wrench, that of 𝒢 with (1 + 1/h) K for
-// p' = r(a) + η (p̂ − r(a)), η = h/(1 + h), or by Assumption 1 with K, 1/η of the forces. For parts of it the bound
-// holds as it does for those of the step.
+// again by steps of 𝒢. A step of length h has the wrench K (r(b) − p̂) + K (r(b) − r(a))/h, which is that of 𝒢 with (1
+// + 1/h) K for p' = r(a) + η (p̂ − r(a)), η = h/(1 + h). By Assumption 1 𝒢 gives the same pose with K, and η times the
+// forces. The bound holds for parts of a jump as for parts of a step.
 //
-// Thus what the forces push forward by, f_n nᵀ(x(b) − x(a)), summed over smaller and smaller parts, goes to zero, but
-// for places where the tool springs: there it stays. Those may give what curvature_J() says of the step, no more.
+// So with smaller and smaller parts the sum of f_n nᵀ(x(b) − x(a)) goes to zero, except where the tool jumps by a
+// fault. The sum may be at most the step's curvature_J().
 //
-// A step asks the world at p̂ alone, and next to an edge it may have several solutions there. An edge of the tool that
-// comes onto a vertex lies on it for a part of the way, from 0.62 to 0.72 in replay 5530763864440370, step 74; from q a
-// place up to 51 µm beyond is found all along that part, or no forces (1126755579853460, step 435). So a pose of the
-// way goes on from the one before, not from q. And at p̂ the tool that follows may come to another solution than the
-// step did (54327521292900, step 25, with 0.19 mm between them). Both keep the law; the energy that a step may get at
-// an edge is what it gets where its parts lead. So the step's end, too, must push forward since q by no more than that
-// one does.
+// Near an edge p̂ may have several solutions. An edge of the tool that reaches a vertex lies on it along a part of the
+// path (σ = 0.62 to 0.72 in replay 5530763864440370, step 74); there a step from q finds a place up to 51 µm beyond, or
+// no forces (replay 1126755579853460, step 435). So each pose of the path starts from the pose before, not from q. At
+// p̂ itself the following tool may reach another solution than the step did (replay 54327521292900, step 25: 0.19 mm
+// apart). Both obey the law, but at an edge a step may gain only the energy that its parts gain. So the step's end must
+// not push forward from q by more than the path's end does.
 //
-// And where two vertices meet, or a vertex and an edge that leans over it, the tool may lie for long, held by normals
-// of which each alone would let it go: as on a needle's point. On which side of that place p̂'s first poses are decides
-// whether it comes to lie there (1958603531041721, step 829: of ways that begin with eighths, quarters or fifths, but
-// not of those with halves, thirds or sevenths). A step that goes by keeps the law, if one of the ways leads to where
-// it does. None leads to where a fault does: 5459542357847018, step 719, was by a wedge, held by two vertices beyond
-// it, and of ways of 1 to 64 parts all came to lie in the wedge.
+// Where two vertices meet, or a vertex and an edge that leans over it, the tool may balance as on a needle's point,
+// held by normals of which each alone would let it go. The side of the point on which the first poses lie decides
+// whether it gets there (replay 1958603531041721, step 829: paths that start with eighths, quarters or fifths get
+// there, those with halves, thirds or sevenths don't). A step that goes past the point obeys the law if one of the
+// paths ends where the step does. For a fault none does: in replay 5459542357847018, step 719, the step ended beside a
+// wedge, held by two vertices beyond it, while all paths of 1 to 64 parts ended in the wedge.
 //
-// All of a step's ways may lead through such a place, onto the needle, and the step beyond it (5693172070329278, step
-// 17: an edge of the tool slides along a mesh's edge to its end, and over the vertex there on one of its sides). As on
-// a needle it doesn't stay there: put a nanometre aside it falls. In a wedge it does. So a way may go on from next to
-// where it lies on a point; that it was put there, and what pushes it on from the point itself, counts as any part's.
+// All of a step's paths may lead onto such a point, and the step beyond it (replay 5693172070329278, step 17: an edge
+// of the tool slides along a mesh's edge to its end, and over the vertex there to one side). Displaced by a nanometre a
+// tool falls off a needle's point, but stays in a wedge. So a path may continue from a pose next to the point. The
+// displacement, and what pushes the tool on from the point, count as for any part.
 //
-// Along an edge that crosses another one at a small angle the normal turns fast, and 𝒢 allows for what the tool turns
-// by, no more: such parts may be unresolved, however small (replay 5930090148271672, step 429: from 0.9102 of the way
-// on, on along the object's edge, until from 0.92 to 0.95 a vertex holds the tool). What is found from q at 0.92 is a
-// step of 𝒢, too, by the same p̂. So where no way keeps the bound, one may have such poses, if none are found from the
-// one before: what pushes on to them from there counts as any part's.
+// Along an edge that crosses another one at a small angle the normal turns fast, but 𝒢 allows only for the tool's own
+// turn, so even small parts may be unresolved (replay 5930090148271672, step 429: from σ = 0.9102 on the tool moves
+// along the object's edge, until a vertex holds it from 0.92 to 0.95). A pose found from q at 0.92 is also a step of 𝒢,
+// by the same p̂. So if no path keeps the bound, a path may use poses found from q where none is found from the pose
+// before. What pushes the tool on to them counts as for any part.
 //
-// Friction is against the slip, by which it takes energy; what part of it a place comes back in a jump says nothing.
-// Nor does a pose for which no forces are found: parts are those between the others.
+// Only normal forces are judged. Friction acts against the slip and takes energy; a point that moves back in a jump
+// proves nothing about it. Poses without forces are left out, and parts lie between the remaining ones.
 #pragma once
 
 #include <compare>
@@ -69,19 +68,19 @@ namespace proxarm::studies {
 
 class ToolParts {
  public:
-  // `fresh`: a world that knows of no step. Precondition: the laws and it outlive this.
+  // `fresh`: a world that hasn't made a step. Precondition: `laws` and `fresh` outlive this object.
   ToolParts(const ToolLaws& laws, const models::PoseAlgorithm& fresh) : laws_(laws), fresh_(fresh) {}
 
-  // Whether what is pushed forward in the parts is no more than curvature may give, and edges that it goes over account
-  // for `rest_J`, by what touched before the step, to be given, and on the way, added: at each eighth at least where
-  // forces were found, and closer where the parts push while something isn't accounted for. If that isn't so of a way
-  // that is divided in eighths first, of one that is divided otherwise, put aside, or goes on from q. `short_m`: of
-  // gaps at q.
+  // Returns whether the step's parts push forward by at most curvature_J(), and the edges on its path account for
+  // `rest_J`. `touched` holds the contacts before the step; those on the path are added. The path is divided into
+  // eighths, and further where parts push forward while energy is unexplained. If this path fails, tries paths divided
+  // otherwise, displaced from points, or continued from q. `short_m`: by how much gaps at q fall short of 0.
   [[nodiscard]] bool keep(const ToolCall& call, double short_m, double rest_J,
                           std::vector<models::PoseContact>& touched) const;
 
  private:
-  // A place on the way: of p̂, and while p̂ waits there, of time: τ = waited/(1 − waited). At 1 it goes on.
+  // A place on the path: p̂'s share of the way from q, and while p̂ waits there, the time τ = waited/(1 − waited). At
+  // waited = 1 p̂ moves on.
   struct Mark {
     double share = 0.0, waited = 1.0;
     friend auto operator<=>(const Mark&, const Mark&) = default;
@@ -94,32 +93,32 @@ class ToolParts {
   [[nodiscard]] static double time_of(const ToolCall& call, const Mark& mark) {
     return call.since_s + mark.share * (call.time_s - call.since_s);
   }
-  // How a way goes on: put aside where it lies on a point (and whether it has lain on one), and from q where nothing is
-  // found from the pose before.
+  // How a path continues: displaced by `aside` where it lies on a point (`lay`: it has lain on one), or from q if no
+  // forces are found from the pose before.
   struct Going {
     models::Twist aside = models::Twist::Zero();
     bool lay = false;
     bool from_q = false;
   };
   struct Sum {
-    double all_J = 0.0, undivided_J = 0.0;  // of what can't be divided any more
-    double most_J = 0.0;                    // the part that pushes most,
-    Mark divide;                            // where to divide it
-    std::size_t before = 0;                 // and the pose that it begins at
+    double all_J = 0.0, undivided_J = 0.0;  // of parts that can't be divided further
+    double most_J = 0.0;                    // the part that pushes forward most
+    Mark divide;                            // where to divide that part
+    std::size_t before = 0;                 // the pose at which that part starts
   };
   static std::optional<Mark> between(const Mark& a, const Mark& b);
   static std::optional<Mark> divide(const std::vector<Mark>& marks, const Mark& from, const Mark& to);
   [[nodiscard]] bool keep_from(int parts, Going& going, const ToolCall& call, double short_m, double rest_J,
                                std::vector<models::PoseContact>& touched) const;
-  // From the last of the poses on, to p̂.
+  // Continues the path from its last pose to p̂.
   void follow(const ToolCall& call, const std::vector<Mark>& marks, Going& going, std::vector<Pose>& way) const;
-  // Whether forces are found for a pose of the way: a step to its p̂. `drawn`: its share of K (p̂ − r).
+  // Makes a step to the pose's p̂; returns whether forces are found. `drawn`: η, which scales K (p̂ − r).
   [[nodiscard]] bool find(Pose& pose, const Pose& last, const models::ToolPose& start, double drawn) const;
-  // Where a way goes on from.
+  // The pose from which a path continues.
   [[nodiscard]] models::ToolPose from(const Pose& pose, Going& going) const;
   [[nodiscard]] double pushed_J(const Pose& from, const Pose& to) const;
-  // Of a way's parts, the last of which leads to the step's end, or to the way's where that one pushes since q by as
-  // much or more.
+  // Sums the parts of a path. The last part leads to the step's end, or to the path's own end if that pushes forward
+  // from q by as much or more.
   [[nodiscard]] Sum sum_of(const std::vector<Pose>& way, const std::vector<Mark>& marks, const ToolCall& call) const;
 
   const ToolLaws& laws_;

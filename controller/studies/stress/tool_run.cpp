@@ -25,7 +25,7 @@ using models::Twist;
 using models::Vec3;
 
 constexpr int steps_per_run = 1000;
-constexpr double most_m = 0.05, most_rad = 0.3, furthest_m = 2.0;  // of a step; from the origin
+constexpr double most_m = 0.05, most_rad = 0.3, furthest_m = 2.0;  // largest step; largest distance from the origin
 constexpr double lever = ToolLaws::lever_m;
 
 Twist levers() {
@@ -34,7 +34,7 @@ Twist levers() {
   return out;
 }
 
-// Eigenvectors in all directions, eigenvalues (N/m) of 1 to `condition`.
+// A random K: eigenvectors in all directions, eigenvalues (N/m) of 1 to `condition`.
 Mat6 random_stiffness(Random& random, double condition) {
   Mat6 A;
   for (int i = 0; i < 36; ++i) A.data()[i] = random.uniform(-1.0, 1.0);
@@ -46,7 +46,7 @@ Mat6 random_stiffness(Random& random, double condition) {
   return half * half.transpose();
 }
 
-// What a hand or a machine might do, about a place to which it comes back, `home`.
+// A wrench that a hand or a machine might make, with a return to `home`.
 class Pull {
  public:
   Pull(Random& random, const Vec3& towards, const Vec3& home)
@@ -83,7 +83,7 @@ class Pull {
       h.force += size_N_ * noise_ * random_.in_box(1.0);
       h.torque += size_N_ * arm_m_ * noise_ * random_.in_box(1.0);
     }
-    // A spring and a damper, of a frequency that the timestep carries.
+    // A spring and a damper with a frequency at which the timestep is stable.
     const double rate = centring_ / config.period_s;
     h.force -= config.mass_kg * rate * (rate * (q - home_) + v);
     h.torque -= config.inertia_kg_m2 * rate * omega;
@@ -98,8 +98,8 @@ class Pull {
   Vec3 force_, torque_, towards_, home_;
 };
 
-// In the middle of something hollow a tool would touch nothing. (Drawn apart, so that other worlds stay what their
-// seeds make them.)
+// A tool in the middle of a hollow object would touch nothing. (Drawn from its own seed, so that other worlds stay the
+// same.)
 Vec3 home_in(const std::string& kind, std::uint64_t seed) {
   Random random(seed + 1);
   const double away_m = random.uniform(0.0, 0.15);
@@ -112,14 +112,14 @@ class Judge {
   Judge(const ToolLaws& laws, PoseAlgorithm& g, Random& random, Tally& tally, std::string* report)
       : laws_(laws), g_(g), fresh_(g.clone()), parts_(laws, *fresh_), random_(random), tally_(tally), report_(report) {}
 
-  // `rise_J`: of the tool's energy beyond the hand's work.
+  // `rise_J`: rise of the tool's energy beyond the hand's work.
   void step(std::int64_t k, bool fault, const ToolCall& call, double rise_J) {
     step_ = k;
     ++tally_.steps;
     if (fault) return note(finite, call, "", 0.0);
     tally_.contact += call.contacts.empty() ? 0 : 1;
     tally_.slipping += std::any_of(call.contacts.begin(), call.contacts.end(), [](const auto& c) { return c.slips; });
-    // A step that finds no forces keeps its gaps nevertheless.
+    // Even a step without forces must keep its gaps.
     const double depth = laws_.depth_m(call.r, call.time_s);
     tally_.deepest_m = std::max(tally_.deepest_m, depth / (1.0 + call.r.position.norm()));
     if (!(depth <= 1e-12)) note(inside, call, "", depth);
@@ -170,7 +170,7 @@ class Judge {
     }
   }
 
-  // As tests/models/rigid/stiffness_independence_test.cpp, which says where what is allowed comes from.
+  // As in tests/models/rigid/stiffness_independence_test.cpp, which explains the tolerances.
   void judge_stiffness(const ToolCall& call) {
     Twist w = Twist::Zero();
     double least_slip_m = 1e9;
@@ -193,7 +193,7 @@ class Judge {
     other.since_s = call.since_s;
     other.time_s = call.time_s;
     other.with = call.with;
-    // (One that has made the step finds its objects at rest.)
+    // The world that made the step would find its objects at rest.
     const std::unique_ptr<PoseAlgorithm> again = laws_.moves() ? fresh_->clone() : nullptr;
     PoseAlgorithm& g = again ? *again : g_;
     g.set_time({.time_s = call.time_s, .period_s = call.time_s - call.since_s});
@@ -207,7 +207,7 @@ class Judge {
     if (g.unresolved()) {
       ++tally_.unresolved;
     } else if (!(off <= std::min(allowed, 1e-10))) {
-      // Two answers that both keep the laws of the same state are Coulomb's, not the algorithm's.
+      // If two answers obey the laws of the same state, Coulomb's law has several solutions, and 𝒢 isn't at fault.
       if (laws_.missed(other).empty() && laws_.depth_m(other.r, other.time_s) <= 1e-12) {
         ++tally_.several;
       } else {
@@ -218,7 +218,7 @@ class Judge {
 
   const ToolLaws& laws_;
   PoseAlgorithm& g_;
-  std::unique_ptr<PoseAlgorithm> fresh_;  // that knows of no step
+  std::unique_ptr<PoseAlgorithm> fresh_;  // hasn't made a step
   ToolParts parts_;
   Random& random_;
   Tally& tally_;
@@ -228,7 +228,7 @@ class Judge {
   std::int64_t step_ = 0;
 };
 
-// A pose a millimetre outside of everything; false where chance found none.
+// Finds a pose a millimetre outside all objects; false if none was found by chance.
 bool find_start(Random& random, const ToolLaws& laws, ToolPose& q) {
   for (int k = 0; k < 300; ++k) {
     q.position = random.in_box(0.15);
@@ -242,7 +242,7 @@ bool find_start(Random& random, const ToolLaws& laws, ToolPose& q) {
 
 Tally run_tool_seed(std::uint64_t seed, bool moving, std::string* report) {
   Random random(seed);
-  // (Drawn apart, so that the others stay what they were before there were meshes.)
+  // Drawn from its own seed, so that the other draws stay the same as before meshes were added.
   const bool meshes = Random(seed + 2).chance(0.2);
   RandomToolScene made = meshes ? random_mesh_tool_scene(random) : random_tool_scene(random);
   if (moving) set_in_motion(random, made.scene);
@@ -274,7 +274,7 @@ Tally run_tool_seed(std::uint64_t seed, bool moving, std::string* report) {
     const double before_J = energy_J();
     const models::Wrench h = pull(k, proxy);
     call.p = proxy.predict(h);
-    // Flung away or spun, it is where a session's limits have ended it.
+    // A session's limits would have ended such a motion.
     const Twist way = models::difference(call.p, call.q);
     if (way.head<3>().norm() > most_m || way.tail<3>().norm() > most_rad || call.q.position.norm() > furthest_m) break;
     call.since_s = proxy.time_s();
@@ -289,7 +289,7 @@ Tally run_tool_seed(std::uint64_t seed, bool moving, std::string* report) {
     const double hand_J = h.force.dot(proxy.move().head<3>()) + h.torque.dot(proxy.move().tail<3>());
     if (!g->squeezed()) judge.step(k, fault, call, energy_J() - before_J - hand_J);
     tally.squeezed += g->squeezed() ? 1 : 0;
-    if (fault || g->squeezed()) break;  // nothing is known of a tool that has no room
+    if (fault || g->squeezed()) break;  // a tool without room isn't judged
   }
   return tally;
 }

@@ -1,6 +1,5 @@
-// Writes session.mcap of a record: forces and joints of every cycle, contacts where there are some, poses and
-// transforms of every tenth, and the scene when something in it moves. It is written while the session runs, outside of
-// the cycle.
+// Writes session.mcap of a record: forces and joints of every cycle, contacts if there are any, poses and transforms of
+// every tenth cycle, and the scene when something moves. Written during the session, outside the cycle.
 #pragma once
 
 #include <array>
@@ -18,10 +17,10 @@ class McapRecord {
   // Precondition: `stage` outlives this object. Throws SetupError.
   McapRecord(const std::filesystem::path& file, Stage& stage);
 
-  // A cycle as the record's signals have it: with its distances, and in simulation with the truth.
+  // Adds a cycle as in the record's signals: with its distances, and in simulation with the true state.
   void add(const controller::CycleRecord& completed) { waiting_.push_back(completed); }
-  // Writes the cycles that have been added since the last call, with the changes that the box has of them. Cycles that
-  // the box has lost are left out.
+  // Writes the cycles added since the last call, with the changes from the box. Cycles that the box has lost are left
+  // out.
   void drain(const controller::BoxReader& box);
   void finish();  // throws SetupError
 
@@ -36,9 +35,9 @@ class McapRecord {
   std::array<std::uint16_t, topic_count> channels_{};
   MomentBuilder builder_;
   std::vector<models::Pose> links_, objects_, drawn_;
-  std::deque<controller::CycleRecord> waiting_;  // for the box to have the whole cycle
+  std::deque<controller::CycleRecord> waiting_;  // until the box has the whole cycle
   std::uint64_t cycles_ = 0;
-  bool told_contacts_ = false, told_arrows_ = false;  // a message that names some is the last one
+  bool told_contacts_ = false, told_arrows_ = false;  // the last message lists some
   controller::BoxCycle cycle_;
 };
 

@@ -1,10 +1,9 @@
-// Writes MCAP, the container of messages that Foxglove, Lichtblick and ROS tools read.
+// Writes MCAP, the message container of Foxglove, Lichtblick and ROS tools.
 //
 // A file is magic, records, magic. A record is an opcode (u8), its length (u64) and its content. Numbers are
-// little-endian; strings and maps are preceded by their length in bytes (u32). Messages are in chunks of about a
-// megabyte, each followed by an index of its messages. At the end, schemas and channels are repeated, with the chunks'
-// index and the counts, so that a reader finds any time without reading all. Chunks are compressed by Zstandard, and
-// only they have checksums.
+// little-endian; strings and maps follow their length in bytes (u32). Messages are in chunks of about a megabyte,
+// compressed by Zstandard and with checksums, each followed by an index of its messages. The file ends with schemas and
+// channels once more, the chunks' index and counts, so that a reader finds any time quickly.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +21,8 @@ class McapWriter {
   // Throws SetupError for a file that can't be written.
   explicit McapWriter(const std::filesystem::path& file);
 
-  // Precondition: both are called before the first message. They return the id. A channel's messages are JSON,
-  // described by a JSON Schema.
+  // Return the id. A channel's messages are JSON, described by a JSON Schema. Precondition: called before the first
+  // message.
   std::uint16_t add_schema(const std::string& name, const std::string& json_schema);
   std::uint16_t add_channel(const std::string& topic, std::uint16_t schema);
   // Precondition: times don't decrease.

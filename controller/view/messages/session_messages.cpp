@@ -38,7 +38,6 @@ void put_time(JsonText& json, std::int64_t time_ns) {
   json.begin_object().add("sec", time_ns / 1'000'000'000).add("nsec", time_ns % 1'000'000'000).end();
 }
 
-// The beginning that most messages share.
 JsonText begin_message(std::int64_t time_ns) {
   JsonText json;
   put_time(json.begin_object().name("timestamp"), time_ns);
@@ -70,7 +69,7 @@ Pose between(const Vec3& from, const Vec3& to) {
 // Large meshes would make the message larger than tools accept, so only every n-th of their triangles is sent.
 constexpr std::size_t most_triangles = 20'000;
 
-// A foxglove.SceneEntity: a list for each kind of shape.
+// A foxglove.SceneEntity: one list for each kind of shape.
 class Entity {
  public:
   explicit Entity(const Colour& colour) : colour_(colour) {
@@ -78,7 +77,7 @@ class Entity {
   }
   void set_colour(const Colour& colour) { colour_ = colour; }
 
-  // Points along x of its pose.
+  // The arrow points along x of its pose.
   void add_arrow(const Pose& X, double length_m, double thickness_m) {
     const double head_m = std::min(3.0 * thickness_m, length_m);
     begin_shape(arrows_, X);
@@ -145,7 +144,7 @@ void add_shape(Entity& entity, const models::LinkShape& shape) {
   }
 }
 
-// `X`: the object's displacement from where it is described.
+// `X`: the object's displacement from its pose in the scene's file.
 void add_object(Entity& entity, const scenes::Object& object, const Pose& X) {
   if (const auto* plane = std::get_if<scenes::PlaneShape>(&object.shape)) {
     Pose sheet = X * at(plane->point_m);

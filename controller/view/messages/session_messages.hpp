@@ -1,14 +1,15 @@
-// A session as JSON messages, for tools that don't know proxarm: in Foxglove's schemas where these exist (poses,
-// transforms, the scene), and in our own for forces, contacts, joints and the session's state.
+// A session as JSON messages for other tools: Foxglove's schemas for poses, transforms and the scene, our own for
+// forces, contacts, joints and the session's state.
 //
-//   /tool, /proxy      foxglove.PoseInFrame       where they are, in W
+//   /tool, /proxy      foxglove.PoseInFrame       poses in W
 //   /wrench            proxarm.Wrench             the hand's, in W
 //   /contact           proxarm.Contact            the world's force on the proxy, normal, friction, distances
-//   /contacts          proxarm.Contacts           each that is recorded: place, normal, force, torque, object, part,
-//   gap /contact_arrows    foxglove.SceneUpdate       their forces, at their places /joint_states proxarm.JointStates
-//   commanded and measured /session           proxarm.Session            phase, limits, fault, mass /tf
-//   foxglove.FrameTransforms   the arm's links in W /scene             foxglove.SceneUpdate       arm and scene; once,
-//   and when objects move
+//   /contacts          proxarm.Contacts           each contact: place, normal, force, torque, object, part, gap
+//   /contact_arrows    foxglove.SceneUpdate       the contacts' forces at their places
+//   /joint_states      proxarm.JointStates        commanded and measured
+//   /session           proxarm.Session            phase, limits, fault, mass
+//   /tf                foxglove.FrameTransforms   the arm's links in W
+//   /scene             foxglove.SceneUpdate       arm and scene; once, and when objects move
 #pragma once
 
 #include <cstdint>
@@ -36,8 +37,8 @@ inline constexpr std::size_t topic_count = static_cast<std::size_t>(Topic::conta
 
 struct TopicDescription {
   const char* topic;
-  const char* schema;       // its name
-  std::string json_schema;  // its text
+  const char* schema;
+  std::string json_schema;
 };
 [[nodiscard]] const TopicDescription& describe(Topic topic);
 

@@ -15,7 +15,7 @@ using controller::CycleRecord;
 using controller::RecordedContact;
 using controller::Triple;
 
-// Of a damaged file any number may stand there.
+// A damaged file may contain any number.
 std::int32_t index_of(double value) { return std::abs(value) < 1e9 ? static_cast<std::int32_t>(value) : -1; }
 
 double number_of(std::string_view text) {

@@ -1,4 +1,4 @@
-// The contacts of any cycle of a record: contacts.csv or contacts.bin.
+// Reads the contacts of any cycle of a record from contacts.csv or contacts.bin.
 #pragma once
 
 #include <filesystem>
@@ -16,14 +16,14 @@ class ContactsFile {
   // Throws SetupError for a file of another kind.
   explicit ContactsFile(const std::filesystem::path& folder);
 
-  // Sets the contacts of the cycle whose number the record has. Where a session was kept without them those of its
-  // signals are taken for a point's.
+  // Sets the contacts of the cycle whose number the record has. A session recorded without this file has its signals'
+  // contacts, taken for a point's.
   void complete(controller::CycleRecord& record) const;
 
  private:
   using Store = void (*)(controller::RecordedContact& contact, std::size_t part, double value);
   struct Column {
-    Store store = nullptr;  // null: not of a contact
+    Store store = nullptr;  // null: not a contact's column
     std::size_t part = 0;   // component of a vector
   };
   [[nodiscard]] static Column column_named(std::string_view name);

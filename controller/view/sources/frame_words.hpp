@@ -10,7 +10,7 @@
 namespace proxarm::view {
 
 struct FrameWords {
-  std::string bus;    // the bus' name in the network
+  std::string bus;
   std::string id;     // hexadecimal
   std::string bytes;  // hexadecimal, separated by spaces
   std::string from;   // "axis_3", "sensor", "controller"

@@ -13,7 +13,7 @@ LiveSource::LiveSource(int descriptor, Stage& stage)
     : box_(descriptor), stage_(stage), builder_(stage.handle_mass_kg()), settings_(stage) {}
 
 bool LiveSource::advance() {
-  // The truth comes just after its cycle.
+  // The true pose is written just after its cycle.
   const std::uint64_t told = box_.truths(), end = told > 0 ? told : box_.cycles();
   if (next_ >= end) return false;
   if (const std::uint64_t oldest = box_.oldest_cycle(); next_ < oldest) next_ = oldest;
@@ -48,7 +48,7 @@ std::string LiveSource::encode(const Moment& moment) {
   stage_.place(moment.record, moment.rendered_s, links_, objects_);
   Moment turned = moment;
   turned.tool_q = models::Quaternion(stage_.tool_pose(links_).linear());
-  // As often as the panel's figures change: distances of a tool among meshes take their time.
+  // As often as the panel's figures change: a tool's distances to meshes take time.
   if (const double now_s = 1e-9 * static_cast<double>(moment.record.time_ns); now_s >= next_room_s_) {
     next_room_s_ = now_s + between_rooms_s;
     room_ = stage_.room(moment.record, moment.rendered_s);

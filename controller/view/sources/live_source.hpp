@@ -1,4 +1,4 @@
-// A running session, read from the shared memory of its black box while its cycle writes there. The cycle isn't
+// Reads a running session from the shared memory of its black box while the cycle writes there. The cycle isn't
 // involved.
 #pragma once
 
@@ -19,19 +19,18 @@ class LiveSource {
   // Precondition: `stage` outlives this object. Throws std::runtime_error if the descriptor isn't that of a black box.
   LiveSource(int descriptor, Stage& stage);
 
-  // Reads all cycles that have been added since the last call, of a simulation those whose truth is told. Returns false
-  // if there was none.
+  // Reads all cycles since the last call; in simulation, those whose true pose is written. Returns false if there was
+  // none.
   bool advance();
-  // The moment that these cycles make up. Precondition: advance() has returned true since the last call.
+  // Returns the moment of these cycles. Precondition: advance() has returned true since the last call.
   Moment take();
-  // This moment as a message of the wire.
   [[nodiscard]] std::string encode(const Moment& moment);
 
   // The session's settings after all cycles that were read. The second function returns true once after each change.
   [[nodiscard]] const PresentSettings& settings() const noexcept { return settings_; }
   bool have_settings_changed() noexcept { return std::exchange(settings_changed_, false); }
 
-  // How the handle vibrated in the last second; empty before that. By the truth where a simulation tells it.
+  // The handle's vibration in the last second; empty before that. From the true pose in simulation.
   [[nodiscard]] std::vector<controller::HandleSpectrum::Band> spectrum() const { return spectrum_.bands(); }
 
   // The fields of the last 20 s of moments, one after the other, for pages that connect later.

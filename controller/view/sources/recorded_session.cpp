@@ -17,8 +17,8 @@ using controller::Phase;
 using description::Json;
 
 constexpr std::size_t most_events = 2000;
-constexpr std::int64_t apart_ns = 200'000'000;  // an event that recurs sooner counts as the same
-// A contact that goes on for so long is no bounce, and its force isn't the impact's any more.
+constexpr std::int64_t apart_ns = 200'000'000;  // a sooner repetition counts as the same event
+// A contact of this length is no bounce, and its force isn't the impact's any more.
 constexpr std::int64_t lasting_ns = 100'000'000;
 
 std::vector<std::string> axis_names(const Stage& stage) {
@@ -38,7 +38,7 @@ std::uint32_t holding_back() {
   return bits;
 }
 
-// Only a simulation's record has where the tool truly was.
+// Only a simulation's record has the tool's true place.
 bool is_true(const CycleRecord& record) { return controller::vec3(record.true_tool_W_m).norm() > 0.0; }
 
 std::string words_of(std::uint32_t flags) {
@@ -85,7 +85,7 @@ void RecordedSession::find_events() {
   CycleRecord last = signals_.row(0);
   std::int64_t rendered = 0, limited_ns = -apart_ns, touched_ns = -apart_ns, since_ns = 0;
   std::int64_t longest_ns = -1;
-  std::size_t lasting = 0;  // the first cycle whose contact has lasted, or else the one that comes nearest to that
+  std::size_t lasting = 0;  // the first cycle whose contact has lasted long enough, else the end of the longest contact
   const auto add = [&](RecordedEvent::Kind kind, std::size_t at, const CycleRecord& record, std::string text) {
     if (events_.size() < most_events) {
       events_.push_back({kind, at, 1e-9 * static_cast<double>(record.time_ns), std::move(text)});
@@ -134,7 +134,7 @@ void RecordedSession::index_frames() {
   for (controller::ReplayPlace at = log_.position(); log_.skip(); at = log_.position()) positions_.push_back(at);
 }
 
-// Objects are moved cycle by cycle, as they were in the session.
+// Moves the objects cycle by cycle, as in the session.
 void RecordedSession::follow_driven() {
   controller::BoxCycle cycle;
   std::vector<controller::BoxFrame> frames;
@@ -177,7 +177,7 @@ std::vector<controller::HandleSpectrum::Band> RecordedSession::spectrum(std::siz
   static_assert(controller::HandleSpectrum::window_s == 1.0);
   controller::HandleSpectrum spectrum;
   std::size_t first = index;
-  // Two cycles more: of places it takes second differences.
+  // Two cycles more, since the spectrum takes second differences of positions.
   while (first > 0 && time_ns_[index] - time_ns_[first] < window_ns + 2 * (time_ns_[first] - time_ns_[first - 1])) {
     --first;
   }
@@ -192,7 +192,7 @@ std::vector<controller::HandleSpectrum::Band> RecordedSession::spectrum(std::siz
 
 bool RecordedSession::has_truth(std::size_t index) const { return is_true(signals_.row(index)); }
 
-// Of the touch that a cycle belongs to, or of one that ended within the last second.
+// Of the cycle's touch, or of one that ended within the last second.
 Blow RecordedSession::blow_before(std::size_t index) const {
   constexpr std::size_t most = 1000;
   const auto touches = [this](std::size_t i) { return touch_begins_[i] <= i; };

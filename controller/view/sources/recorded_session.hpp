@@ -1,4 +1,4 @@
-// A recorded session or a black box: each of its cycles, the events in it, and the frames on the buses in each cycle.
+// Reads a recorded session or a black box: cycles, events, and the frames on the buses in each cycle.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,6 @@
 
 namespace proxarm::view {
 
-// An event in a record that is worth a look.
 struct RecordedEvent {
   enum class Kind : std::uint8_t { contact, limit, phase, fault };
   Kind kind = Kind::contact;
@@ -30,27 +29,26 @@ class RecordedSession {
 
   [[nodiscard]] std::size_t size() const noexcept { return signals_.size(); }
   [[nodiscard]] const std::vector<RecordedEvent>& events() const noexcept { return events_; }
-  // The index to open the record at: the fault, else where a contact has lasted 0.1 s, else the end of the longest
+  // The cycle at which the record opens: the fault, else a contact that has lasted 0.1 s, else the end of the longest
   // contact, else the beginning.
   [[nodiscard]] std::size_t opening() const noexcept { return opening_; }
   // For any thread.
   [[nodiscard]] double time_s(std::size_t index) const noexcept;
-  // The fault, as the black box or the summary tells it; empty if there was none.
+  // The fault as the black box or the summary reports it; empty if there was none.
   [[nodiscard]] const std::string& fault() const noexcept { return fault_; }
   // Whether moments of this cycle show the fault.
   [[nodiscard]] bool is_faulted(std::size_t index) const noexcept { return !fault_.empty() && index >= fault_at_; }
 
   // Precondition of all: index < size().
   [[nodiscard]] Moment moment(std::size_t index) const;
-  // This moment as a message of the wire.
   [[nodiscard]] std::string encode(std::size_t index) const;
-  // How the handle vibrated in the second that ends with this cycle; empty where there is no such second.
+  // The handle's vibration in the second that ends with this cycle; empty if there is no such second.
   [[nodiscard]] std::vector<controller::HandleSpectrum::Band> spectrum(std::size_t index) const;
-  // Whether the record has where the tool truly was.
+  // Whether the record has the tool's true place.
   [[nodiscard]] bool has_truth(std::size_t index) const;
   // The fields of at most `rows` moments between two cycles, with the peaks between them.
   [[nodiscard]] std::vector<double> window(std::size_t from, std::size_t to, std::size_t rows) const;
-  // The frames on the buses in that cycle; empty if the record's replay doesn't contain it.
+  // The frames on the buses in that cycle; empty if the record's replay doesn't contain the cycle.
   std::vector<controller::BoxFrame> frames(std::size_t index);
   [[nodiscard]] const controller::ReplayHead& head() const noexcept { return log_.head(); }
 
@@ -67,9 +65,9 @@ class RecordedSession {
   ContactsFile contacts_;
   std::uint64_t first_cycle_ = 0;            // number of the first row's cycle
   std::vector<std::int64_t> time_ns_;        // of each cycle
-  std::vector<std::uint32_t> touch_begins_;  // of each cycle, the first of its touch; the largest: it touches nothing
+  std::vector<std::uint32_t> touch_begins_;  // of each cycle, the first cycle of its touch; the largest value: no touch
   std::vector<std::int64_t> rendered_ns_;    // time rendered before each cycle, since the record's beginning
-  std::vector<controller::ReplayPlace> positions_;  // of each cycle in the log, from its first one on
+  std::vector<controller::ReplayPlace> positions_;  // of each cycle in the log, from the log's first one on
   std::vector<std::array<float, 3>> driven_m_;      // of each cycle and object; empty if no object is driven
   std::vector<RecordedEvent> events_;
   std::size_t opening_ = 0, fault_at_ = 0;

@@ -124,7 +124,7 @@ constexpr std::array vectors{NamedVector{"force_S", "N", store_part<&CycleRecord
                              NamedVector{"contact_torque_W", "Nm", store_part<&CycleRecord::contact_torque_W_Nm>},
                              NamedVector{"hand_torque_W", "Nm", store_part<&CycleRecord::hand_torque_W_Nm>}};
 
-// "contact_object_2", "friction_2", "normal_2_W_x_1": of further contacts.
+// "contact_object_2", "friction_2", "normal_2_W_x_1": columns of further contacts.
 constexpr std::array<std::string_view, 3> axes_in_names{"_x_", "_y_", "_z_"};
 
 struct OtherColumn {

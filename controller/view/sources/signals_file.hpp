@@ -1,8 +1,8 @@
-// Reads any row of a record's signals.csv or signals.bin. A row of text is parsed when it is asked for; where each
-// begins is found once.
+// Reads any row of a record's signals.csv or signals.bin. The beginnings of text rows are found once; a row is parsed
+// on request.
 //
-// Columns are identified by their names, so the columns that are known are read from records of other versions, too. An
-// incomplete last row counts as the end.
+// Columns are identified by name, so known columns can be read from records of other versions. An incomplete last row
+// counts as the end.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ class SignalsFile {
   SignalsFile(const std::filesystem::path& folder, const std::vector<std::string>& axis_names);
 
   [[nodiscard]] std::size_t size() const noexcept { return table_ ? table_->rows() : text_->rows(); }
-  // All that the file contains of a cycle. Precondition: index < size().
+  // Everything that the file contains about a cycle. Precondition: index < size().
   [[nodiscard]] controller::CycleRecord row(std::size_t index) const;
 
   // A value as the file has it.
@@ -45,7 +45,7 @@ class SignalsFile {
   void add_from_table(controller::CycleRecord& record, std::size_t index) const;
 
   std::unique_ptr<controller::SignalTable> table_;
-  std::unique_ptr<TextTable> text_;  // null where there is a table
+  std::unique_ptr<TextTable> text_;  // null if there is a table
   std::vector<Column> columns_;
 };
 

@@ -1,5 +1,5 @@
-// A table of a record as text (signals.csv, contacts.csv), mapped into memory: its header, and any row as a line. Where
-// each row begins is found once. An incomplete last row counts as the end.
+// A record's table as text (signals.csv, contacts.csv), mapped into memory: its header, and any row. The beginnings of
+// rows are found once. An incomplete last row counts as the end.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace proxarm::view {
 
 class TextTable {
  public:
-  // Throws SetupError if there is no such file, or one whose header begins otherwise.
+  // Throws SetupError if the file is missing or its header begins otherwise.
   TextTable(const std::filesystem::path& file, std::string_view header_begins);
   TextTable(const TextTable&) = delete;
   TextTable& operator=(const TextTable&) = delete;

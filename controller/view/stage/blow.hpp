@@ -1,5 +1,5 @@
-// The impulse of an impact. (26) stops a proxy within one step: its force is then M v/T for a cycle, hundreds of
-// newtons that say more of the timestep than of the touch. What a hand gets is the impulse, M v.
+// The impulse of an impact, M v: what the hand receives. The force isn't a useful measure: (26) stops a proxy within
+// one step, so it is M v/T for a cycle, hundreds of newtons that depend on the timestep.
 #pragma once
 
 #include <algorithm>
@@ -12,10 +12,10 @@ namespace proxarm::view {
 
 class Blow {
  public:
-  // Of a touch's beginning, in which the gears still ring.
+  // The beginning of a touch, while the gears still ring.
   static constexpr std::int64_t lasts_ns = 50'000'000;
 
-  // Precondition: cycles come in their order; after a gap it counts from the next touch on.
+  // Precondition: cycles come in order. After a gap, counting starts with the next touch.
   void add(const controller::CycleRecord& record) noexcept {
     const bool touches = record.contact != controller::ContactPhase::free;
     if (touches && !touched_) {
@@ -28,9 +28,9 @@ class Blow {
         controller::vec3(record.contact_force_W_N).norm() - controller::vec3(record.force_W_N).norm();
     impulse_Ns_ += std::max(0.0, beyond_N) * 1e-9 * static_cast<double>(record.period_ns);
   }
-  // Of the last touch's first 50 ms: what its force had beyond the hand's, Ns; NaN before the first touch.
+  // Over the last touch's first 50 ms: the contact force beyond the hand's, integrated, Ns; NaN before the first touch.
   [[nodiscard]] double impulse_Ns() const noexcept { return impulse_Ns_; }
-  // When that touch began, s after the first cycle; NaN before it.
+  // When that touch began, s after the first cycle; NaN before the first touch.
   [[nodiscard]] double begun_s() const noexcept {
     return impulse_Ns_ >= 0.0 ? 1e-9 * static_cast<double>(begun_ns_) : impulse_Ns_;
   }

@@ -1,4 +1,4 @@
-// Stage::describe(): what a page needs to know once, as JSON.
+// Stage::describe(): what a page needs once, as JSON.
 #include <algorithm>
 #include <cmath>
 
@@ -26,13 +26,11 @@ void put(JsonText& json, const Pose& X) {
   json.end();
 }
 
-// Adds a vector or a pose as a member of the present object.
 template <typename Value>
 void add(JsonText& json, const char* name, const Value& value) {
   put(json.name(name), value);
 }
 
-// Adds a capsule or a cylinder.
 template <typename Round>
 void add_round(JsonText& json, const Round& shape) {
   add(json, "from", shape.from_m);
@@ -137,7 +135,7 @@ void put_links(JsonText& json, const models::LinkTree& tree) {
   json.end();
 }
 
-// Sides that aren't finite are open and written as null; a box without any finite side is null itself.
+// Infinite sides are open and written as null; a box without any finite side is null itself.
 void put_box(JsonText& json, const std::array<double, 3>& low, const std::array<double, 3>& high) {
   const auto is_border = [](double x) { return std::isfinite(x); };
   if (std::none_of(low.begin(), low.end(), is_border) && std::none_of(high.begin(), high.end(), is_border)) {
@@ -180,7 +178,7 @@ void put_words(JsonText& json, bool arm_alone) {
   json.end().end();
 }
 
-// Faces of a hull as triangles: corners, and three of them for each.
+// Faces of a hull as triangles: its points, and three indices for each triangle.
 void add_hull(JsonText& json, const models::ConvexTool& hull) {
   const models::Solid solid = models::solid_of(hull, Pose::Identity());
   json.add("kind", "hull").name("points").begin_list();

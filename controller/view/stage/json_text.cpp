@@ -45,7 +45,7 @@ JsonText& JsonText::name(std::string_view name) {
 
 JsonText& JsonText::value(double number) {
   if (!std::isfinite(number)) return literal("null");
-  std::array<char, 32> digits;  // the shortest text that reads as the same number has at most 24 characters
+  std::array<char, 32> digits;  // enough: the shortest exact text has at most 24 characters
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
   return literal({digits.data(), static_cast<std::size_t>(end - digits.data())});
 }

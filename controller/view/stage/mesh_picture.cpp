@@ -88,7 +88,7 @@ std::string packed(std::span<const Vec3> vertices, std::span<const Corners> tria
 
 std::string mesh_picture(std::span<const Vec3> vertices, std::span<const Corners> triangles, const Vec3& scale) {
   if (triangles.size() <= most_triangles) return packed(vertices, triangles, scale);
-  // A cube that a smooth surface passes through keeps about three triangles, one of a rough surface more.
+  // A cube on a smooth surface keeps about three triangles, on a rough surface more.
   double cube = std::sqrt(3.0 * area(vertices, triangles) / static_cast<double>(most_triangles));
   Mesh coarse = clustered(vertices, triangles, cube);
   for (constexpr double larger = 1.2; coarse.triangles.size() > most_triangles;) {

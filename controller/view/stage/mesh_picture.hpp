@@ -1,5 +1,5 @@
-// A mesh as a page draws it. Large meshes are made coarser: software rendering takes seconds for a third of a million
-// triangles, none of which is then larger than a pixel.
+// Packs a mesh for display. Large meshes are made coarser: software rendering takes seconds for 300,000 triangles, each
+// of which would be smaller than a pixel.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace proxarm::view {
 
-// The most triangles that are sent. An object of 0.3 m keeps its shape to about a millimetre.
+// The largest number of triangles sent. An object of 0.3 m keeps its shape to about a millimetre.
 inline constexpr std::size_t most_triangles = 80'000;
 
 // Packs a mesh for a GPU: uint32 number of vertices, uint32 number of triangles, then float x y z of each vertex and

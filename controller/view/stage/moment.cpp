@@ -12,7 +12,6 @@ using controller::CycleRecord;
 using controller::Triple;
 using models::Vec3;
 
-// A field: its name and how its number is computed.
 struct Field {
   const char* name;
   double (*value)(const Moment&);
@@ -63,7 +62,6 @@ constexpr std::array fields{
     Field{"room_z", [](const Moment& m) { return m.room ? m.room->normal_W.z() : unknown; }},
 };
 
-// A vector: one name, three numbers.
 struct VectorField {
   const char* name;
   Triple CycleRecord::*value;
@@ -75,7 +73,7 @@ constexpr std::array vectors{VectorField{"force", &CycleRecord::force_W_N},
                              VectorField{"contact_force", &CycleRecord::contact_force_W_N},
                              VectorField{"contact_torque", &CycleRecord::contact_torque_W_Nm},
                              VectorField{"tool", &CycleRecord::tool_W_m},
-                             VectorField{"steel", &CycleRecord::true_tool_W_m}};  // zero: nobody knows it
+                             VectorField{"steel", &CycleRecord::true_tool_W_m}};  // zero: unknown
 
 template <typename Number>
 void append(std::string& bytes, std::span<const Number> numbers) {
@@ -148,8 +146,8 @@ const std::vector<std::string>& contact_field_names() {
 
 namespace {
 
-// How far the point of a rigid tool that lies at `point` while the tool is at the proxy's pose lies from there while
-// the tool is at another one, in W. A tool that isn't turned has the proxy's orientation.
+// The displacement of a point of a rigid tool, in W, if the tool moves from the proxy's pose to this one. `point`: with
+// the tool at the proxy's pose. A tool that doesn't turn has the proxy's orientation.
 Vec3 moved_with(const CycleRecord& record, const Vec3& point, const Vec3& place,
                 const models::Quaternion& orientation) {
   const Vec3 proxy = controller::vec3(record.proxy_W_m), arm = point - proxy;
@@ -161,7 +159,7 @@ Vec3 moved_with(const CycleRecord& record, const Vec3& point, const Vec3& place,
 // In the order of contact_field_names().
 void append_contacts(std::vector<double>& row, const Moment& moment) {
   const CycleRecord& record = moment.record;
-  // Where the steel is, only a simulation knows, and its record.
+  // Only a simulation and its record have the tool's true place.
   const Vec3 steel = controller::vec3(record.true_tool_W_m);
   const bool is_known = steel.norm() > 0.0;
   row.push_back(static_cast<double>(record.recorded_contacts()));

@@ -1,13 +1,13 @@
-// One moment of a session as a page draws it: numbers with names, and poses.
+// One moment of a session for display: named numbers, and poses.
 //
-// The wire, little-endian as the machine is:
+// The wire format, in the machine's byte order, which is little-endian:
 //   double            kind: 1, a moment; 2, a history of moments without contacts and poses
 //   double[fields]    the fields, in the order of field_names()
 //   double            number of contacts
-//   double[fields]    of each of them, in the order of contact_field_names()
+//   double[fields]    of each contact, in the order of contact_field_names()
 //   float[7 links]    x y z and quaternion x y z w of each of the arm's links in W
-//   float[7 objects]  displacement of each object of the scene from where the scene describes it
-// After the kind, a history has the number of its rows, and then the fields of each row.
+//   float[7 objects]  displacement of each object of the scene from its pose in the scene's file
+// A history has after its kind the number of rows, and then the fields of each row.
 #pragma once
 
 #include <cstdint>
@@ -25,36 +25,35 @@ namespace proxarm::view {
 
 inline constexpr double kind_moment = 1.0, kind_history = 2.0;
 
-// How far the tool could go from the proxy's pose without turning, along the normal of the strongest contact; while
-// nothing is touched, along the way out of what is nearest.
+// How far the tool could move from the proxy's pose without turning, along the normal of the strongest contact; if
+// nothing is touched, along the way out of the nearest object.
 struct Room {
   models::Vec3 normal_W = models::Vec3::Zero();
-  double below_m = 0.0;  // to what is touched
-  double above_m = 0.0;  // to the other side, as of a hole; infinite: none within most_m
+  double below_m = 0.0;  // to the touched object
+  double above_m = 0.0;  // to the opposite side, as in a hole; infinite: nothing within most_m
   static constexpr double most_m = 1e-3;
 };
 
-// What a page is shown of one cycle, and of the cycles before it that it wasn't shown.
+// What a page shows of one cycle, and of the cycles since the last one shown.
 struct Moment {
   controller::CycleRecord record;
   double rendered_s = 0.0;
-  double handle_mass_kg = 0.0;    // the tool's mass behind the sensor, which the hand feels besides the proxy's
+  double handle_mass_kg = 0.0;    // mass of the tool behind the sensor, which the hand feels in addition to the proxy's
   std::uint32_t flags_since = 0;  // all RecordFlags since the last moment
-  double compute_peak_us = 0.0;   // the longest time of these cycles
-  double hand_peak_N = 0.0;       // the hand's largest force
-  double contact_peak_N = 0.0;    // the world's largest force
-  std::uint64_t overruns = 0;     // since the session began
-  Blow blow;                      // of the last touch
-  std::optional<Room> room;       // none: nothing is within Room::most_m
+  double compute_peak_us = 0.0;   // longest time of these cycles
+  double hand_peak_N = 0.0;
+  double contact_peak_N = 0.0;
+  std::uint64_t overruns = 0;                                  // since the session began
+  Blow blow;                                                   // of the last touch
+  std::optional<Room> room;                                    // absent: nothing within Room::most_m
   models::Quaternion tool_q = models::Quaternion::Identity();  // of the tool in W, by the encoders
 };
 
-// Accumulates what happens between two moments.
 class MomentBuilder {
  public:
   explicit MomentBuilder(double handle_mass_kg) noexcept { next_.handle_mass_kg = handle_mass_kg; }
   void add(const controller::CycleRecord& record, double rendered_s) noexcept;
-  // Returns the newest cycle that was added, and restarts the peaks.
+  // Returns the newest cycle, and restarts the peaks.
   Moment take() noexcept;
   [[nodiscard]] bool empty() const noexcept { return cycles_ == 0; }
 
@@ -68,7 +67,6 @@ class MomentBuilder {
 [[nodiscard]] const std::vector<std::string>& contact_field_names();
 void append_fields(std::vector<double>& row, const Moment& moment);
 
-// A complete message.
 std::string encode_moment(const Moment& moment, std::span<const models::Pose> links,
                           std::span<const models::Pose> objects);
 // `rows`: fields of several moments, one after the other.

@@ -1,7 +1,7 @@
-// The present settings of a session, whoever changed them: options, scripts, `proxarm set`, a page, a tool.
+// The present settings of a session, whether changed by options, scripts, `proxarm set`, a page or a tool.
 //
-// They are followed through the changes that the cycle took, since its records don't contain them all: a record's
-// damping includes what was added against oscillations, its mass is zero in a hold, and no record has the spring.
+// They follow from the changes that the cycle took, since its records don't contain them all: a record's damping
+// includes the damping added against oscillations, its mass is zero in a hold, and no record has the spring.
 #pragma once
 
 #include <vector>

@@ -1,7 +1,7 @@
-// The arm and the scene of a session: a description that is sent once, and the poses of all in a cycle.
+// The arm and the scene of a session for display: a description that is sent once, and the poses of all links and
+// objects in a cycle.
 //
-// It is made only from the cell's and the scene's files, so a running and a recorded session look alike. It is for
-// display, outside of the cycle.
+// It uses only the cell's and the scene's files, so running and recorded sessions look alike. Not for the cycle.
 #pragma once
 
 #include <memory>
@@ -21,7 +21,7 @@
 
 namespace proxarm::view {
 
-// What the files don't contain.
+// Settings that the files don't contain.
 struct StageOptions {
   bool arm_alone = false;  // without a controller: no proxy, and the phase stands for the state of the drives
   double period_s = 1e-3;
@@ -41,20 +41,19 @@ class Stage {
   // The handle's part of the felt mass; 0 in the impedance type, whose proxy has no mass.
   [[nodiscard]] double handle_mass_kg() const noexcept { return options_.impedance ? 0.0 : cell_.tool.mass_kg; }
 
-  // All that a page needs to know once, as JSON: fields of the wire, links, objects, limits, texts.
+  // Everything that a page needs once, as JSON: fields of the wire, links, objects, limits, texts.
   [[nodiscard]] std::string describe() const;
   // A mesh of the scene (link < 0) or of a link's shape, as mesh_picture() packs it. Throws SetupError.
   [[nodiscard]] std::string mesh_bytes(int link, std::size_t index) const;
 
-  // Moves and changes the objects as the cycle does. `change`: the change that the cycle took; `rendered`: whether it
-  // rendered.
+  // Moves and changes the objects as the cycle does. `change`: taken by the cycle; `rendered`: whether it rendered.
   void follow(const controller::Change& change, bool rendered, double period_s) noexcept;
 
-  // Adds the distances of proxy and tool, with the tool's shape where there is one: the cycle doesn't compute them.
+  // Adds the distances of proxy and tool, using the tool's shape if it has one: the cycle doesn't compute them.
   void complete(controller::CycleRecord& record, double rendered_s) const;
-  // The room about the proxy, by up to some forty distances of the tool: of meshes a millisecond or more.
+  // The room around the proxy, by up to some forty distances of the tool; with meshes a millisecond or more.
   [[nodiscard]] std::optional<Room> room(const controller::CycleRecord& record, double rendered_s) const;
-  // A driven object's displacement from where the scene describes it, after all calls of follow().
+  // A driven object's displacement from its pose in the scene's file, after all calls of follow().
   [[nodiscard]] models::Vec3 driven_m(std::size_t object) const noexcept {
     return changes_.position_m(static_cast<std::int32_t>(object));
   }
@@ -75,7 +74,7 @@ class Stage {
   models::LinkTree tree_;
   scenes::CompiledScene compiled_;  // only for the changes to its objects
   controller::SceneChanges changes_;
-  std::unique_ptr<models::PoseAlgorithm> rigid_;  // for a tool's distances; null: a point is rendered
+  std::unique_ptr<models::PoseAlgorithm> rigid_;  // for distances of a tool with a shape; null: a point tool
 };
 
 }  // namespace proxarm::view

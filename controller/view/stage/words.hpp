@@ -12,7 +12,6 @@ namespace proxarm::view {
 using controller::flag_words;
 using controller::FlagWords;
 
-// What the arm does in a phase.
 struct PhaseWords {
   const char* name;
   const char* words;

@@ -1,4 +1,4 @@
-// A file that the server sends, and what it tells the browser about it.
+// A file that the server sends, with its headers.
 #pragma once
 
 #include <filesystem>
@@ -22,7 +22,7 @@ AssetPtr make_asset(std::string type, std::string body);
 // The content type by the end of the name; "application/octet-stream" for unknown ones.
 std::string type_of(const std::filesystem::path& file);
 
-// All files of a page by their URL paths: "/index.html". Only what is listed is served, so no path leads elsewhere.
+// All files of a page by their URL paths ("/index.html"). Only these are served, so no path leads elsewhere.
 using Assets = std::map<std::string, AssetPtr, std::less<>>;
 
 // Adds the files of `folder` under their paths in it. Throws SetupError if there is no index.html.

@@ -42,8 +42,7 @@ Gate::Gate(std::uint16_t port, std::vector<std::string> allowed_origins)
     : host_("127.0.0.1:" + std::to_string(port)),
       origin_("http://" + host_),
       token_(random_secret()),
-      cookie_name_("proxarm_" +
-                   std::to_string(port)),  // cookies ignore the port, so each session's has a name of its own
+      cookie_name_("proxarm_" + std::to_string(port)),  // cookies ignore the port, so each session has a cookie name
       cookie_(random_secret()),
       allowed_(std::move(allowed_origins)) {}
 
@@ -73,7 +72,7 @@ Verdict Gate::judge(const RequestHead& head) const {
 
   if (!head.origins.empty() && head.origins[0] != origin_) return refusal(403, "the request is of another origin");
   if (!head.fetch_site.empty() && head.fetch_site != "same-origin" && head.fetch_site != "none") {
-    // A request from elsewhere may only open the whole URL with its secret, as a link in a terminal does.
+    // A request from elsewhere may only open the whole URL with its secret, as from a link in a terminal.
     if (!(path == "/" && with_token)) return refusal(403, "the request comes from another page");
   }
   if (path == "/" && !token.empty()) {

@@ -1,14 +1,14 @@
-// Decides from each request's head alone who may see the page and who may speak to it.
+// Decides from each request's head alone who may see the page and who may connect to it.
 //
-// A port on 127.0.0.1 can be reached by every program and every user of this machine, and by every web page that its
-// browsers have open. What a page from elsewhere can do, and what stops it here:
-//   it names a host of its own that resolves to 127.0.0.1 (DNS rebinding)   Host must be 127.0.0.1 with the port
-//   it sends forms, images, scripts or WebSockets across                    Origin and Sec-Fetch-Site must be ours,
+// Every program and user of this machine, and every web page open in its browsers, can reach a port on 127.0.0.1. What
+// a page from elsewhere can do, and what stops it here:
+//   names its own host that resolves to 127.0.0.1 (DNS rebinding)           Host must be 127.0.0.1 with the port
+//   sends forms, images, scripts or WebSockets here                         Origin and Sec-Fetch-Site must be ours,
 //                                                                           only GET and HEAD, no bodies
-//   it, or another program, guesses the address                             a secret of 256 bits in the URL; after the
+//   guesses the address, as may another program                             a secret of 256 bits in the URL; after the
 //                                                                           first load a cookie with another one
-// An origin that was allowed (--allow-origin) may open a WebSocket with one of the protocols for other tools, with the
-// secret in its URL; the page, its files and its own WebSocket are for our origin alone.
+// An allowed origin (--allow-origin) may open a WebSocket with one of the protocols for other tools, with the secret in
+// its URL. The page, its files and its own WebSocket are only for our origin.
 #pragma once
 
 #include <cstdint>

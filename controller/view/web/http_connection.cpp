@@ -37,7 +37,7 @@ RequestHead head_of(const http::request_parser<http::empty_body>& parser) {
   return head;
 }
 
-// Headers of each answer: no other page may embed ours, and ours may embed nothing from elsewhere.
+// Headers of each answer: no other page may embed ours, and ours embeds nothing from elsewhere.
 template <typename Body>
 void protect(http::response<Body>& response) {
   response.set(http::field::server, "proxarm");
@@ -105,8 +105,8 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
     serve_socket(shared_, std::move(stream_), parser_->release(), channel);
   }
 
-  // If a page from elsewhere led here (such as the one that opens the browser), the browser wouldn't send a cookie with
-  // a redirect. Such a request therefore gets the page itself.
+  // A page from elsewhere may lead here, such as the one that opens the browser. The browser then wouldn't send a
+  // cookie with a redirect, so it gets the page itself.
   void welcome(bool from_elsewhere) {
     if (from_elsewhere) return serve("/index.html", true);
     Text response{http::status::see_other, parser_->get().version()};

@@ -1,4 +1,4 @@
-// Random secrets, and a comparison whose duration doesn't tell how much of a guess was right.
+// Random secrets, and a comparison whose duration doesn't reveal how much of a guess was right.
 #pragma once
 
 #include <string>

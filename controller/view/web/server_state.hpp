@@ -1,4 +1,4 @@
-// What the connections of a WebServer share. Private to this room.
+// State shared by the connections of a WebServer. Private to this room.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -19,10 +19,10 @@ namespace proxarm::view {
 // web_server.hpp gives the reasons.
 inline constexpr std::size_t most_connections = 64;
 inline constexpr std::size_t longest_head = 8192, longest_message = 1024;
-inline constexpr auto patience = std::chrono::seconds(5);  // for a request's head, and for a reader who accepts nothing
+inline constexpr auto patience = std::chrono::seconds(5);    // for a request's head, and for a reader that accepts
+                                                             // nothing
 inline constexpr auto idle_time = std::chrono::seconds(20);  // between two requests on one connection
 
-// A connection, as an element of the list of all.
 class Connection {
  public:
   Connection() = default;
@@ -30,7 +30,7 @@ class Connection {
   Connection& operator=(const Connection&) = delete;
   virtual ~Connection() = default;
   virtual void close() = 0;
-  // It has presented the secret or the cookie.
+  // whether it has presented the secret or the cookie
   bool known = false;
 };
 
@@ -46,7 +46,7 @@ struct ServerShared {
   Channel* tools = nullptr;
   std::list<std::weak_ptr<Connection>> connections;  // oldest first
   std::size_t sockets = 0;
-  // For all connections together. Those without the secret have a budget of their own, so they can't use up the
+  // For all connections together. Connections without the secret have a separate budget, so they can't exhaust the
   // others'.
   Budget requests{300.0, 600.0}, requests_of_strangers{300.0, 600.0};
 

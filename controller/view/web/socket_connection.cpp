@@ -15,7 +15,7 @@ namespace http = beast::http;
 namespace websocket = beast::websocket;
 using boost::system::error_code;
 
-constexpr std::size_t most_waiting = 256;      // messages that may be waiting for a reader
+constexpr std::size_t most_waiting = 256;      // messages waiting for a reader
 constexpr int send_buffer_bytes = 256 * 1024;  // the kernel's buffer: how far a reader may lag unnoticed
 
 std::vector<std::string> offered_protocols(const Request& request) {
@@ -77,7 +77,7 @@ class SocketConnection final : public Connection, public Socket, public std::ena
     timer_.cancel();
     stream_.next_layer().socket().close(ignored);
     if (!std::exchange(open_, false)) return;
-    // Posted, so that it doesn't happen within one of the channel's own calls.
+    // Posted, so that it doesn't run within the channel's calls.
     boost::asio::post(shared_->context, [self = shared_from_this()] { self->channel_.closed(self); });
   }
   [[nodiscard]] const std::string& protocol() const noexcept override { return protocol_; }

@@ -1,9 +1,8 @@
-// HTTP and WebSocket on 127.0.0.1 for one page and the tools beside it, in one thread.
+// HTTP and WebSocket server on 127.0.0.1 for one page and other tools, in one thread.
 //
-// No client can slow down the others, whatever it sends or doesn't send. Limits: request heads of 8 KiB within 5 s, no
-// bodies, 64 connections (the oldest without the secret makes room), 16 WebSockets, messages of 1 KiB and 200 per
-// second. For a slow reader only the newest moment waits, and after 5 s in which it has accepted no byte the connection
-// is closed.
+// No client can slow down the others. Limits: request heads of 8 KiB within 5 s, no bodies, 64 connections (the oldest
+// without the secret makes room), 16 WebSockets, messages of 1 KiB and 200 per second. For a slow reader only the
+// newest moment waits; a reader that accepts no byte for 5 s is disconnected.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -31,7 +30,7 @@ class Socket {
   Socket& operator=(const Socket&) = delete;
   virtual ~Socket() = default;
 
-  // Sends a moment (binary). It replaces one that is still waiting, since only the newest counts.
+  // Sends a moment (binary). It replaces one that still waits, since only the newest counts.
   virtual void show(Bytes moment) = 0;
   // Sends a message. All are sent, in order; a reader with too many waiting is dropped.
   virtual void say(Bytes message, bool binary) = 0;
@@ -65,7 +64,7 @@ struct ServerConfig {
 
 class WebServer {
  public:
-  // Finds the file for a path that isn't among the assets; null: there is none.
+  // Returns the file for a path that isn't among the assets; null: there is none.
   using Finder = std::function<AssetPtr(const std::string& path)>;
 
   // Listens at once. Precondition: `page` and `tools` outlive this object; `tools` may be null. Throws SetupError if

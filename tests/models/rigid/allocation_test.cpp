@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "models/base/random.hpp"
+#include "models/local_problem/contact_problem.hpp"
 #include "models/rigid/rigid_world.hpp"
 #include "tests/allocation_count.hpp"
 

@@ -1,11 +1,11 @@
-// Which pairs of features of a mesh that is a part of the tool and of one that is an object may meet.
+// Pairs of features of a mesh of the tool and a mesh that is an object.
 #include <algorithm>
 #include <cmath>
 
-#include "models/rigid/rigid_world.hpp"
 #include "models/rigid_features/mesh_pairs.hpp"
 #include "models/rigid_features/near.hpp"
 #include "models/rigid_features/rigid_features.hpp"
+#include "models/rigid_pairs/gathering.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -72,66 +72,64 @@ class OfFaces {
 
 }  // namespace
 
-bool RigidWorld::lists_leaves(const ToolPose& pose, double reach) const noexcept {
-  return near_leaves_.all() && motion(pose, near_leaves_.at()) + reach <= near_leaves_.reach();
-}
-
-// Of all meshes that stand still. To list twice as many costs less than to list them again in the next step: as far
-// around as some hundreds of them are, and for what is gathered now if there is no room for so many.
-void RigidWorld::list_leaves(const ToolPose& pose, double reach) noexcept {
+// Lists the leaves of all meshes that stand still. Listing twice as many costs less than listing them again in the next
+// step. So they are listed as far around as some hundreds of them are; if there is no room for that, as far as pairs
+// are gathered now.
+void Gathering::list_leaves(const ToolPose& pose, double reach) noexcept {
   constexpr std::size_t few = 384, many = 640;
   constexpr double furthest = 8.0;
-  if (!near_leaves_.has_room() || lists_leaves(pose, reach)) return;
-  const double further = list_further_;
+  if (!out_->near_leaves.has_room() || out_->lists_leaves(*bodies_, pose, reach)) return;
+  const double further = out_->list_further;
   list_leaves_within(pose, further * reach);
-  const bool listed = near_leaves_.all();
-  if (listed && near_leaves_.count() < few) list_further_ = std::min(1.5 * further, furthest);
-  if (!listed || near_leaves_.count() > many) list_further_ = std::max(further / 1.5, 1.0);
+  const bool listed = out_->near_leaves.all();
+  if (listed && out_->near_leaves.count() < few) out_->list_further = std::min(1.5 * further, furthest);
+  if (!listed || out_->near_leaves.count() > many) out_->list_further = std::max(further / 1.5, 1.0);
   if (!listed && further > 1.0) list_leaves_within(pose, reach);
 }
 
-void RigidWorld::list_leaves_within(const ToolPose& pose, double reach) noexcept {
-  near_leaves_.begin(pose, reach);
+void Gathering::list_leaves_within(const ToolPose& pose, double reach) noexcept {
+  const RigidSetup& setup = bodies_->setup();
+  out_->near_leaves.begin(pose, reach);
   const View at = view(pose);
-  for (std::size_t entry = 0; entry < shared_->first_moving; ++entry) {
-    const Entry& e = shared_->entries[entry];
-    for (std::size_t i = 0; i < shared_->parts.size(); ++i) {
-      const Part& part = shared_->parts[i];
+  for (std::size_t entry = 0; entry < setup.first_moving; ++entry) {
+    const RigidEntry& e = setup.entries[entry];
+    for (std::size_t i = 0; i < setup.parts.size(); ++i) {
+      const RigidPart& part = setup.parts[i];
       if (!part.mesh || !e.discs.any() || !may_reach(part, e, at, reach)) continue;
-      near_leaves_.begin_with(static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(entry));
+      out_->near_leaves.begin_with(static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(entry));
       const MeshPairs pairs(flat_mesh(part), flat_mesh(e), at, reach);
-      pairs.list([&](const MeshPairs::Leaves& leaves) { return near_leaves_.add(leaves); });
-      if (!near_leaves_.all()) return;
+      pairs.list([&](const MeshPairs::Leaves& leaves) { return out_->near_leaves.add(leaves); });
+      if (!out_->near_leaves.all()) return;
     }
   }
 }
 
-void RigidWorld::gather_meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
-  const Entry& e = shared_->entries[entry];
-  const TriangleFeatures& own = *shared_->parts[part].mesh;
-  const TriangleFeatures& other = **std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
-  const OfFaces of(own, other, e.held, at, reach, reach / shared_->reach);
-  const auto add = [&](Kind kind) {
+void Gathering::meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
+  const RigidSetup& setup = bodies_->setup();
+  const RigidEntry& e = setup.entries[entry];
+  const TriangleFeatures& own = *setup.parts[part].mesh;
+  const TriangleFeatures& other = *e.mesh();
+  const OfFaces of(own, other, e.held, at, reach, reach / setup.reach_m);
+  const auto adds = [&](PairKind kind) {
     return [this, kind, part, entry](std::uint32_t i, std::uint32_t j, double apart_m) {
-      add_pair(kind, part, entry, i, j, apart_m);
+      add(kind, part, entry, i, j, apart_m);
     };
   };
   std::size_t looked_at = 0;
   const auto look_at = [&](std::uint32_t face, std::uint32_t other_face) {
-    crowded_ = crowded_ || looked_at++ == face_room_;
-    if (crowded_) return false;
-    of.points_of_tool(face, other_face, add(Kind::point_face));
-    of.points_of_object(face, other_face, add(Kind::face_point));
-    of.edges(face, other_face, add(Kind::edges));
+    if (!take_face(looked_at)) return false;
+    of.points_of_tool(face, other_face, adds(PairKind::point_face));
+    of.points_of_object(face, other_face, adds(PairKind::face_point));
+    of.edges(face, other_face, adds(PairKind::edges));
     return true;
   };
-  MeshPairs pairs(flat_mesh(shared_->parts[part]), flat_mesh(e), at, reach);
-  if (!moves(entry) && near_leaves_.all()) {
-    pairs.each_of(near_leaves_.of(part, entry).value_or(NearLeaves::Items{}), look_at);
+  MeshPairs pairs(flat_mesh(setup.parts[part]), flat_mesh(e), at, reach);
+  if (!bodies_->moves(entry) && out_->near_leaves.all()) {
+    pairs.each_of(out_->near_leaves.of(part, entry).value_or(NearLeaves::Items{}), look_at);
   } else {
     pairs.each(look_at);
   }
-  near_faces_ += looked_at;
+  out_->near_faces += looked_at;
 }
 
 }  // namespace proxarm::models

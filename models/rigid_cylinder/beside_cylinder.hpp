@@ -1,4 +1,5 @@
-// The features of what is beside a cylinder, in its own frame: a convex solid, or a mesh of which one side is touched.
+// The features of the body beside a cylinder, in that body's frame: a convex solid, or a mesh of which one side is
+// touched.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +8,8 @@
 #include <limits>
 #include <span>
 
+#include "models/rigid_bodies/rigid_setup.hpp"
 #include "models/rigid_features/rigid_features.hpp"
-#include "models/rigid_features/rigid_object.hpp"
 
 namespace proxarm::models {
 
@@ -21,7 +22,7 @@ class BesideCylinder {
     std::span<const std::uint32_t> ring;
     double side = 1.0;  // −1: the ring runs clockwise, seen from where the normal points
 
-    // Whether the point's foot lies on it.
+    // Whether the point's foot lies on the face.
     [[nodiscard]] bool over(const Vec3& p, double beside = beside_m) const noexcept {
       return touch_face(p, 0.0, side * normal, 0.0, points, ring, 1.0, beside).has_value();
     }
@@ -53,11 +54,11 @@ class BesideCylinder {
     return {normal, normal.dot(face_of(*mesh_, i).corner), mesh_->mesh().structure().vertices,
             mesh_->mesh().triangle(i), held_};
   }
-  // A mesh's valley is touched by nothing sharp.
+  // False: a valley of a mesh, which no sharp feature touches.
   [[nodiscard]] bool sticks_out(std::uint32_t edge) const noexcept {
     return mesh_ == nullptr || mesh_->edge(edge).ridge == (held_ > 0.0);
   }
-  // Of a solid: how high the lowest place of a rim is over its faces but one, at most.
+  // Greatest height of the lowest place of a rim over all faces but one, m. Precondition: a solid.
   [[nodiscard]] double highest_over_others(const Solid::Rim& rim, std::uint32_t face) const noexcept {
     double most = -std::numeric_limits<double>::infinity();
     for (std::uint32_t i = 0; i < solid_->faces.size(); ++i) {
@@ -74,5 +75,12 @@ class BesideCylinder {
   const TriangleFeatures* mesh_ = nullptr;
   double held_ = 1.0, radius_ = 0.0;
 };
+
+// The body beside the cylinder, if one of the two is a cylinder.
+inline BesideCylinder beside_cylinder(const RigidPart& part, const RigidEntry& entry) noexcept {
+  if (!part.cylinder) return part.mesh ? BesideCylinder(*part.mesh, 1.0) : BesideCylinder(part.solid);
+  const TriangleFeatures* mesh = entry.mesh();
+  return mesh != nullptr ? BesideCylinder(*mesh, entry.held) : BesideCylinder(*entry.solid());
+}
 
 }  // namespace proxarm::models

@@ -1,0 +1,119 @@
+#include "models/rigid/rigid_step.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/rigid/budget.hpp"
+#include "models/rigid_pairs/gathering.hpp"
+
+namespace proxarm::models {
+namespace {
+
+// A part of a step moves no point of the tool by more than this share of the least thickness of what may meet. Features
+// that were up to twice as far behind another one may come to lie in front of it, as where an edge leaves the end of
+// one edge for the next, but never those of a far side.
+constexpr double kPart = 0.2;
+constexpr int kMostPartsOfMoving = 1 << 16;  // among objects that move: batches take many parts at once
+constexpr int kRetries = 6;
+
+}  // namespace
+
+void RigidStep::take(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept {
+  RigidBodies& bodies = state_->bodies;
+  state_->contacts.clear();
+  state_->unresolved = state_->squeezed = false;
+  if (bodies.motion_m(q, state_->q) > kFront_m) state_->candidates.forget();
+  const double far_m = bodies.moving().empty() ? bodies.motion_m(p_hat, q) : bodies.find_approaching(p_hat, q);
+  if (is_free(q, far_m)) {
+    state_->q = p_hat;
+    return;
+  }
+  state_->local.K = K;
+  state_->local.problem.set_stiffness(K);
+  const Plan plan = this->plan(p_hat, q, far_m);
+  const Way way{plan.goal, q, plan.far_m, plan.parts};
+  const bool lawful = take_lawfully(way);
+  if (!lawful) take_without_friction(way);
+  state_->unresolved = !lawful || !plan.whole || attempt_.overflow || state_->candidates.crowded;
+  state_->squeezed = attempt_.squeezed;
+  if (!state_->contacts.collected()) iteration_.collect_contacts(state_->q);
+  state_->contacts.judge_slips(bodies, q, state_->q);
+}
+
+// Whether nothing comes near in this step. Gathers the pairs anew if the tool has come too far for them.
+bool RigidStep::is_free(const ToolPose& q, double far_m) noexcept {
+  const Candidates& candidates = state_->candidates;
+  double came = candidates.came_m(state_->bodies, q);
+  if (state_->clearance_m > 0.0 && came + far_m < state_->clearance_m) return true;
+  if (candidates.crowded || !(came + 2.0 * far_m < candidates.gathered_reach_m)) {
+    Gathering(state_->bodies, state_->candidates).gather_for(q, far_m);
+    came = candidates.came_m(state_->bodies, q);
+  }
+  state_->clearance_m = -1.0;
+  // (If much was near, pairs may be gathered less far around than the step's way.)
+  if (candidates.count != 0 || !(came + far_m < candidates.gathered_reach_m)) return false;
+  state_->clearance_m = candidates.gathered_reach_m;
+  return true;
+}
+
+RigidStep::Plan RigidStep::plan(const ToolPose& p_hat, const ToolPose& q, double far_m) noexcept {
+  const RigidBodies& bodies = state_->bodies;
+  const double reach = state_->candidates.gathered_reach_m;
+  // If all that the step can come near is known, one part may go as far.
+  const bool all_known = !bodies.setup().dense && state_->candidates.came_m(bodies, q) + 2.0 * far_m < reach;
+  const double limit = std::min(kPart * bodies.setup().thinness_m, all_known ? reach : 0.25 * reach);
+  const double wanted = std::max(std::ceil(far_m / limit), 1.0);
+  Plan plan{.goal = p_hat, .far_m = far_m};
+  plan.whole = wanted <= (bodies.something_approaches() ? kMostPartsOfMoving : kMostParts);
+  plan.parts = plan.whole ? static_cast<int>(wanted) : kMostParts;
+  if (!plan.whole) {
+    plan.goal = moved(q, difference(p_hat, q) * (kMostParts / wanted));
+    // With the goal the way gets shorter only if nothing moves.
+    if (bodies.moving().empty()) plan.far_m = bodies.motion_m(plan.goal, q);
+  }
+  attempt_.poses_left = kBudget + kPosesOfPart * plan.parts;
+  attempt_.looks_left = kLooks;
+  attempt_.retries_left = kRetries;
+  allow_for(plan.parts, *state_);
+  return plan;
+}
+
+// A step that has used up its looks finds no more in smaller parts, nor without friction.
+bool RigidStep::may_look_on() const noexcept {
+  return attempt_.looks_left > 0 || !state_->bodies.something_approaches();
+}
+
+// False: no forces were found that keep all laws.
+bool RigidStep::take_lawfully(const Way& way) noexcept {
+  ToolPose& q = state_->q;
+  const bool led = in_parts_.take(way, q) && !fallback_.went_in(way.q_old, q);
+  if (led && in_parts_.gives_energy(q, way.q_old)) return !may_look_on() || in_parts_.take_closely(way, q);
+  if (led || attempt_.poses_left <= 0 || in_parts_.finer(way.parts) <= 1 || !may_look_on()) return led;
+  return in_parts_.take_smaller(way, q) && !fallback_.went_in(way.q_old, q);
+}
+
+// A tool that stayed where it is would meet the same problem in the next step, so friction is left out of this one. In
+// a hole it stays nevertheless, where a part of the step last kept the law: there a jam is what most often has no
+// solution, and without friction it would slip right through.
+void RigidStep::take_without_friction(const Way& way) noexcept {
+  const RigidBodies& bodies = state_->bodies;
+  bool led = false;
+  if (!bodies.setup().hollow && may_look_on()) {
+    attempt_.poses_left = kBudget;
+    attempt_.looks_left = bodies.something_approaches() ? std::min(attempt_.looks_left, kLooks / 2) : kLooks / 2;
+    state_->local.problem.allow(LocalStep::kWork);
+    attempt_.without_friction = true;
+    const ToolPose reached = state_->q;
+    const bool squeezed = attempt_.squeezed;
+    // The iteration may have gone far in a part: in the dent of a mesh past a face that holds only over itself.
+    led = in_parts_.take(way, state_->q) && !(fallback_.may_be_in() && fallback_.stands_in(state_->q));
+    attempt_.without_friction = false;
+    if (!led) {
+      state_->q = reached;
+      attempt_.squeezed = squeezed;
+    }
+  }
+  if (!led) fallback_.went_in(way.q_old, state_->q);
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,42 @@
+// One step of 𝒢 for a rigid tool: in as many parts as it takes, in smaller ones or without friction if that leads
+// nowhere.
+#pragma once
+
+#include "models/rigid/step_in_parts.hpp"
+
+namespace proxarm::models {
+
+class RigidStep {
+ public:
+  explicit RigidStep(RigidState& state) noexcept
+      : state_(&state),
+        iteration_(state, attempt_),
+        fallback_(state, attempt_, iteration_),
+        in_parts_(state, attempt_, iteration_, fallback_) {}
+
+  // Writes state.q, the contacts and the flags of the step.
+  void take(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept;
+
+ private:
+  // The part of the way to p̂ that the step takes, in parts. `whole`: all of it.
+  struct Plan {
+    ToolPose goal;
+    double far_m = 0.0;
+    int parts = 1;
+    bool whole = true;
+  };
+
+  [[nodiscard]] bool is_free(const ToolPose& q, double far_m) noexcept;
+  [[nodiscard]] Plan plan(const ToolPose& p_hat, const ToolPose& q, double far_m) noexcept;
+  bool take_lawfully(const Way& way) noexcept;
+  void take_without_friction(const Way& way) noexcept;
+  [[nodiscard]] bool may_look_on() const noexcept;
+
+  RigidState* state_;
+  Attempt attempt_;
+  Iteration iteration_;
+  Fallback fallback_;
+  StepInParts in_parts_;
+};
+
+}  // namespace proxarm::models

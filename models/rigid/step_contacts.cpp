@@ -1,0 +1,89 @@
+#include "models/rigid/step_contacts.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "models/rigid_gaps/bends.hpp"
+
+namespace proxarm::models {
+namespace {
+
+// A millinewton over a nanometre.
+constexpr double kNothing_J = 1e-12;
+
+}  // namespace
+
+void StepContacts::collect(const RigidBodies& bodies, const Candidates& candidates, const Touches& touches,
+                           const LocalProblem& local, const ToolPose& pose) noexcept {
+  count_ = 0;
+  collected_ = true;
+  with_moving_ = false;
+  for (std::size_t k = 0; k < local.count; ++k) {
+    const Found& found = touches.found[local.found[k]];
+    const Pair& pair = candidates.pairs[found.pair];
+    const LinearContact& linear = local.contacts[k];
+    if (linear.state == ContactState::open && found.touch.gap > kGap_m) continue;
+    const double sine = sine_of_rims(bodies, pair, found.touch, pose);
+    entry_[count_] = pair.entry;
+    turns_[count_] = 1.0 / sine;
+    bend_[count_] = curvature_per_m(bodies, pair) / (sine * sine);
+    with_moving_ = with_moving_ || bodies.moves_now(pair.entry);
+    PoseContact& contact = contacts_[count_++];
+    contact.object = bodies.entry(pair).object.object;
+    contact.part = pair.part;
+    contact.feature = static_cast<std::int32_t>(pair.other);
+    contact.slips = linear.state == ContactState::slip;
+    contact.point_W = found.touch.point;
+    contact.normal_W = found.touch.normal;
+    contact.force_W = local.axes[k] * in_cone(linear.f, linear.mu);
+    contact.gap_m = found.touch.gap;
+    contact.friction = bodies.friction(pair);
+  }
+}
+
+// Of second order: the way of a point that turns by θ at a lever bends by θ² lever/2, a normal turns by θ while the
+// point moves on by s, and a round body falls off by s²/2r. An object that moves does honest work: with it only the
+// tool's motion relative to it counts.
+bool StepContacts::give_energy(RigidBodies& bodies, const ToolPose& pose, const ToolPose& q_old) const noexcept {
+  if (count_ == 0) return false;
+  const View now = view(pose), old = view(q_old);
+  double work = 0.0, bends = 0.0;
+  const double turned_W = rotation_vector(pose.orientation * q_old.orientation.conjugate()).norm();
+  const double rounding = 2.0 * bodies.rounding_m(pose);  // of a way, between two poses
+  bodies.measure_slip(pose, q_old);
+  for (std::size_t k = 0; k < count_; ++k) {
+    const PoseContact& contact = contacts_[k];
+    const double force = contact.force_W.norm();
+    if (force == 0.0) continue;
+    const std::uint16_t entry = entry_[k];
+    const bool moves = bodies.moves_now(entry);
+    const Vec3 way = moves ? bodies.slip_m(entry, contact.point_W - pose.position)
+                           : Vec3(contact.point_W - old * now.to_T(contact.point_W));
+    const double s = way.norm(), lever = (contact.point_W - pose.position).norm();
+    const double turned = moves ? bodies.moving(entry).turned.norm() : turned_W;
+    work += contact.force_W.dot(way);
+    bends += force * (turned * (0.5 * turned * lever + turns_[k] * s) + 0.5 * bend_[k] * s * s + rounding);
+  }
+  return work > bends + kNothing_J;
+}
+
+void StepContacts::judge_slips(RigidBodies& bodies, const ToolPose& q_old, ToolPose& q) noexcept {
+  if (count_ == 0) return;
+  const double rounding = 8.0 * std::numeric_limits<double>::epsilon() *
+                          (q_old.position.lpNorm<1>() + bodies.setup().reach_m + bodies.extent_m());
+  if (!with_moving_) {
+    if (bodies.motion_m(q, q_old) > rounding) return;
+    q = q_old;
+    for (std::size_t k = 0; k < count_; ++k) contacts_[k].slips = false;
+    return;
+  }
+  // If more contacts hold than are needed, one may have its force on the cone without slipping.
+  bodies.measure_slip(q, q_old);
+  for (std::size_t k = 0; k < count_; ++k) {
+    PoseContact& contact = contacts_[k];
+    const Vec3 slip = bodies.slip_since_m(q_old, entry_[k], contact.point_W, q);
+    contact.slips = contact.slips && (slip - contact.normal_W * contact.normal_W.dot(slip)).norm() > rounding;
+  }
+}
+
+}  // namespace proxarm::models

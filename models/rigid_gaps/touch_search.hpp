@@ -1,0 +1,42 @@
+// Finds the touches of all candidate pairs at a pose.
+#pragma once
+
+#include "models/rigid_bodies/sides.hpp"
+#include "models/rigid_gaps/attempt.hpp"
+#include "models/rigid_gaps/touches.hpp"
+#include "models/rigid_pairs/candidates.hpp"
+
+namespace proxarm::models {
+
+class TouchSearch {
+ public:
+  TouchSearch(RigidBodies& bodies, Candidates& candidates, const Sides& sides, Attempt& attempt, Touches& out) noexcept
+      : bodies_(&bodies), candidates_(&candidates), sides_(&sides), attempt_(&attempt), out_(&out) {}
+
+  // All touches, or those that the tool may reach if it moves on by no more than `within_m`.
+  void find(const ToolPose& pose, double within_m = Touches::everywhere_m) noexcept;
+
+ private:
+  void look_at_pairs(const ToolPose& pose, double within_m) noexcept;
+  void look_at(std::size_t index, const View& at, const MovingEntry* on, const ToolPose& pose,
+               class Gaps& gaps) noexcept;
+  void add(const Touch& touch, std::size_t index, int which, const MovingEntry* on, const ToolPose& pose) noexcept;
+  [[nodiscard]] bool needs_others(const Found& found) const noexcept;
+
+  RigidBodies* bodies_;
+  Candidates* candidates_;
+  const Sides* sides_;
+  Attempt* attempt_;
+  Touches* out_;
+};
+
+// Drops touches of features that the tool is behind but that don't hold it: of all faces that a point is under, only
+// the one that it is least deep under does.
+void drop_deeper(const RigidBodies& bodies, const Candidates& candidates, const View& at, Touches& touches) noexcept;
+// Whether one of the two convex bodies that touch reaches beyond the plane between them: then the normal is outside of
+// the cone of normals that this body has there. This is so where a corner has its foot on a face, on the border of that
+// face or on the rim of a cylinder's side, while the corner's own edges lead away.
+[[nodiscard]] bool reaches_beyond(const RigidBodies& bodies, const Pair& pair, const Touch& touch,
+                                  const View& at) noexcept;
+
+}  // namespace proxarm::models

@@ -1,0 +1,51 @@
+// Gathers the pairs of features, one of the tool and one of an object, that come within a distance of each other which
+// the steps to come won't exceed. Pairs are gathered anew only when the tool has moved that far.
+#pragma once
+
+#include "models/rigid_features/near_faces.hpp"
+#include "models/rigid_pairs/candidates.hpp"
+
+namespace proxarm::models {
+
+class Gathering {
+ public:
+  Gathering(RigidBodies& bodies, Candidates& out) noexcept : bodies_(&bodies), out_(&out) {}
+
+  // As far around q as steps like this one, of `far_m`, need for a while; less if there is no room for all pairs.
+  void gather_for(const ToolPose& q, double far_m) noexcept;
+  // All pairs within `reach_m` of each other, with the tool at a pose.
+  void gather(const ToolPose& pose, double reach_m) noexcept;
+
+ private:
+  struct KeptPairs {
+    std::array<Pair, ContactProblem::most> pairs;
+    std::size_t count = 0;
+  };
+
+  // Whether a part of the tool may reach an object, by the ball around the part.
+  [[nodiscard]] static bool may_reach(const RigidPart& part, const RigidEntry& entry, const View& at,
+                                      double reach) noexcept;
+  bool look_around(const ToolPose& pose, double reach, std::size_t pairs = Candidates::most_pairs,
+                   std::size_t faces = NearFaces::most_faces) noexcept;
+  [[nodiscard]] KeptPairs pressed_pairs() const noexcept;
+  void restore(const KeptPairs& kept) noexcept;
+  void list_leaves(const ToolPose& pose, double reach) noexcept;
+  void list_leaves_within(const ToolPose& pose, double reach) noexcept;
+  void entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
+  void part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void cylinders(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void flat_or_hollow(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void add(PairKind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own, std::uint32_t other,
+           double apart_m) noexcept;
+  bool list_triangles(std::uint16_t part, std::uint16_t entry, const NearFaces& close) noexcept;
+  // Takes one more triangle into account. False: there is no room for it.
+  bool take_face(std::size_t& looked_at) noexcept;
+
+  RigidBodies* bodies_;
+  Candidates* out_;
+  std::size_t pair_room_ = Candidates::most_pairs, face_room_ = NearFaces::most_faces;
+};
+
+}  // namespace proxarm::models
