@@ -13,10 +13,10 @@ namespace {
 
 using models::Vec3;
 
-// The spring constants of ISO/TS 15066 lie in this range. 100 N/mm belongs to no body region but fills a gap.
+// The spring constants of ISO/TS 15066 lie in this range. No body region has 100 N/mm; this value fills a gap.
 constexpr std::array body_stiffnesses_N_per_m{10e3, 25e3, 50e3, 75e3, 100e3, 150e3};
 
-// The worst mobility over the directions of the tool's space.
+// Returns the smallest mobility over the directions of the tool's space.
 double worst_mobility(const models::Arm& arm, const models::ToolSpace& space, const models::JointVector& q) {
   models::ToolKinematics at;
   arm.kinematics(q, at);
@@ -85,7 +85,7 @@ class Worst {
 }  // namespace
 
 std::vector<std::vector<double>> poses_about_start(const description::Cell& cell, const models::Arm& arm, int count) {
-  constexpr double reach = 0.4;  // of each joint from its start, in rad or m
+  constexpr double reach = 0.4;  // largest distance of each joint from its start, rad or m
   constexpr double least_share_of_mobility = 0.6;
   constexpr int tries = 1000;
   const models::JointVector& start = arm.start_rad();
@@ -130,7 +130,7 @@ ClampFigure clamp_figure(const Body& body, const TrialResult& result) {
   for (const Sample& sample : result.samples) {
     figure.left_N = 0.0;
     const double depth_m = (sample.tool_W - body.surface_W).dot(body.normal_W);
-    // Until the body is there, the tool is on its outer side.
+    // Before the body appears, the tool is on the body's outer side.
     if (depth_m <= 0.0) continue;
     if (touched_s < 0.0) {
       touched_s = sample.time_s;

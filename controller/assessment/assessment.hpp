@@ -1,14 +1,16 @@
-// Assesses on the simulated arm what a cell's arm does to a person near it: how far it moves on when stopped at full
-// speed, and how hard it presses on a body in its way.
+// Assesses on the simulated arm what a cell's arm does to a person near it: how far the arm moves on when it is stopped
+// at full speed, and how hard it presses on a body in its way.
 //
 // A trial is a session in virtual time: a hand leads the tool straight along a direction through free space, at the
-// speed that the cell allows. The first trial is undisturbed and shows when the tool is fastest. The others are the
-// same up to that time; then
-//   the arm is stopped (category 0: power off, brakes close; 1: controlled, then off; 2: controlled, drives stay on)
-//   or a body appears: a one-sided spring across the tool's way, in front of something rigid. It presses on the
-//   handle, where the sensor measures the force, or on the arm before the sensor, where the force isn't measured.
-// Trials run in several poses and in both directions of the three axes of W (of the axes of the tool's space, if the
-// arm has fewer). The worst figures are reported.
+// speed that the cell allows. The first trial is undisturbed and shows when the tool is fastest. The other trials are
+// the same up to that time. Then one of two things happens:
+// - The arm is stopped. Category 0: power off, brakes close. Category 1: controlled stop, then power off. Category 2:
+//   controlled stop, drives stay on.
+// - A body appears: a one-sided spring across the tool's way, in front of something rigid. It presses on the handle,
+//   where the sensor measures the force, or on the arm before the sensor, where the force isn't measured.
+//
+// Trials run in several poses, and in both directions of the three axes of W. If the arm moves in fewer dimensions,
+// trials run along the axes of the tool's space. The worst figures are reported.
 //
 // The simulation uses the cell file's values under `simulation:`. It certifies nothing.
 #pragma once
@@ -27,7 +29,7 @@ namespace proxarm::assessment {
 
 enum class Stop : std::uint8_t { none, category_0, category_1, category_2 };
 
-// The body in the tool's way.
+// The body in the tool's way. `felt`: whether it presses on the handle, where the sensor measures the force.
 struct Body {
   double stiffness_N_per_m = 0.0;  // 0: no body
   models::Vec3 surface_W = models::Vec3::Zero(), normal_W = models::Vec3::UnitX();
@@ -38,35 +40,36 @@ struct Trial {
   std::vector<double> start_rad;
   models::Vec3 direction_W = models::Vec3::UnitX();
   Stop stop = Stop::none;
-  double at_s = 0.0;  // when the arm is stopped or the body appears, since power on
+  double at_s = 0.0;  // when the arm is stopped or the body appears, since power-on
   Body body{};
 };
 
 struct Sample {
-  double time_s = 0.0;  // since power on
+  double time_s = 0.0;  // since power-on
   models::Vec3 tool_W = models::Vec3::Zero(), velocity_W = models::Vec3::Zero();
 };
 
 struct TrialResult {
-  std::vector<Sample> samples;  // one for each step of the physics
+  std::vector<Sample> samples;  // a sample for each step of the physics
   double stopped_at_s = 0.0;    // when the stop was ordered or the power was cut
   std::string end;              // the fault that ended the session, in words; empty: no fault
 };
 
-// Runs a trial. Throws SetupError if the session can't begin.
+// Runs a trial and returns its result. Throws SetupError if the session can't begin.
 using ArmTrial = std::function<TrialResult(const Trial&)>;
 
-// The tool counts as stopped once it stays within this distance of its final place, m. It is smaller
-// than the yielding of skin; elastic gears may oscillate within it for some tenths of a second after a stop.
+// Distance in m. The tool counts as stopped once it stays within this distance of its final place. The distance is
+// smaller than the yielding of skin. After a stop, elastic gears may let the tool oscillate within it for some tenths
+// of a second.
 inline constexpr double stopped_within_m = 1e-3;
-// At the end of a trial, a tool slower than this counts as at rest, m/s: the speed of an oscillation of 0.1 mm at 16
-// Hz, an arm's first mode.
+// Speed in m/s. A tool slower than this at the end of a trial counts as at rest. It is the speed of an oscillation of
+// 0.1 mm at 16 Hz, an arm's first mode.
 inline constexpr double rest_m_per_s = 0.01;
 
 struct StopFigure {
   Stop stop = Stop::none;
   double from_m_per_s = 0.0, time_s = 0.0, distance_m = 0.0;
-  bool at_rest = true;  // by the end of the trial
+  bool at_rest = true;  // whether the tool is at rest at the end of the trial
   int pose = 0;
   std::string direction;  // "+x"
 };
@@ -74,34 +77,38 @@ struct StopFigure {
 struct ClampFigure {
   bool felt = true;
   double stiffness_N_per_m = 0.0;
-  double transient_N = 0.0,
-         quasi_static_N = 0.0;  // largest force in the first half second of the contact, and after it
-  double energy_J = 0.0;        // largest k x²/2
-  double left_N = 0.0;          // the force at the trial's end
-  double at_m_per_s = 0.0;      // the tool's speed at contact
-  int pose = 0;                 // of the largest transient force
+  // Largest force: transient_N in the first half second of the contact, quasi_static_N after it.
+  double transient_N = 0.0, quasi_static_N = 0.0;
+  double energy_J = 0.0;    // largest energy of the spring, k x²/2
+  double left_N = 0.0;      // force at the end of the trial
+  double at_m_per_s = 0.0;  // the tool's speed at contact
+  int pose = 0;             // the pose with the largest transient force
   std::string direction{}, end{};
 };
 
 struct Assessment {
   std::vector<std::vector<double>> poses_rad;
-  std::vector<StopFigure> stops;       // by category: the largest time and distance, and the distance's pose
-  std::vector<double> longest_stop_s;  // the largest time of each category over all poses
-  std::vector<ClampFigure> clamps;     // by the body's place and stiffness
+  // For each category, the stop with the largest distance. at_rest: whether all trials of the category ended at rest.
+  std::vector<StopFigure> stops;
+  std::vector<double> longest_stop_s;  // for each category, the longest time over all poses
+  // For each place and stiffness of the body, the largest figures of all trials; speed, pose and direction are those of
+  // the largest transient force.
+  std::vector<ClampFigure> clamps;
 };
 
-// The start pose and others near it, within ranges, workspace and keep-out zones, none much nearer to a singularity
-// than the start. The result is the same for each call, and shorter than `count` if there aren't enough poses.
+// Returns the start pose and poses near it, within ranges, workspace and keep-out boxes. None of them is much nearer to
+// a singularity than the start. Each call returns the same poses; fewer than `count` if there aren't enough.
 std::vector<std::vector<double>> poses_about_start(const description::Cell& cell, const models::Arm& arm, int count);
 
-// The figures of a trial in which the arm was stopped.
+// Returns the figures of a trial in which the arm was stopped.
 StopFigure stop_figure(const TrialResult& result);
-// The figures of a trial with a body.
+// Returns the figures of a trial with a body.
 ClampFigure clamp_figure(const Body& body, const TrialResult& result);
 
 // A direction in which a hand leads the tool.
 struct Direction {
-  std::string name;  // "+x"; "+1", "+2" in a tool space that isn't along the axes of W
+  // "+x", or "+1", "+2" if the axes of the tool's space aren't along the axes of W.
+  std::string name;
   models::Vec3 along_W = models::Vec3::UnitX();
 };
 std::vector<Direction> directions_of(const models::ToolSpace& space);

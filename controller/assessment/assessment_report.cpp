@@ -45,7 +45,7 @@ std::string brakes(const Subject& s) {
               s.assumed_brakes, s.assumed_brake_share, 1e3 * s.assumed_brake_delay_s);
 }
 
-// The body region with this body's stiffness; nullptr if there is none.
+// Returns the body region with this body's stiffness; nullptr if no region has it.
 const Region* region_of(const ClampFigure& clamp, const Thresholds& thresholds) {
   for (const Region& region : thresholds.regions) {
     if (region.stiffness_N_per_m == clamp.stiffness_N_per_m) return &region;

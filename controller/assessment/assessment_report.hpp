@@ -7,16 +7,18 @@
 
 namespace proxarm::assessment {
 
-// What was assessed: facts that only the command knows.
+// What was assessed. These are facts that only the command knows.
 struct Subject {
   std::string cell, hand;                                                      // names
-  double stiffness_N_per_m = 0.0, damping_Ns_per_m = 0.0, hand_mass_kg = 0.0;  // of the hand
+  double stiffness_N_per_m = 0.0, damping_Ns_per_m = 0.0, hand_mass_kg = 0.0;  // the hand's values
   double felt_mass_kg = 0.0, period_s = 0.0, max_tool_speed_m_per_s = 0.0;
-  int assumed_brakes = 0;                                         // drives whose cell doesn't describe their brakes
-  double assumed_brake_delay_s = 0.0, assumed_brake_share = 0.0;  // the share is of max_torque_Nm
+  // Number of drives whose cell doesn't describe their brakes.
+  int assumed_brakes = 0;
+  double assumed_brake_delay_s = 0.0, assumed_brake_share = 0.0;  // the share is a share of max_torque_Nm
 };
 
-// Names of the regions whose thresholds a body with the region's stiffness exceeds, such as "hands and fingers".
+// Returns the names of the regions whose thresholds are exceeded by a body with the region's stiffness, such as "hands
+// and fingers".
 std::vector<std::string> exceeded(const Assessment& assessment, const Thresholds& thresholds);
 
 std::string text(const Subject& subject, const Assessment& assessment, const Thresholds& thresholds);

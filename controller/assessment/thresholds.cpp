@@ -8,11 +8,12 @@
 namespace proxarm::assessment {
 namespace {
 
-// From softer than any tissue to harder than a skull; from hardly felt to bone-breaking.
+// Stiffnesses from softer than any tissue to harder than a skull. Forces from hardly felt to bone-breaking.
 constexpr description::Range stiffness_range = description::between(1.0, 1000.0);
 constexpr description::Range force_range = description::between(1.0, 10'000.0);
-constexpr double per_mm = 1000.0;  // N/m in a N/mm
-// From slow swinging to frequencies that are heard rather than felt; from below any threshold to shaking the arm.
+constexpr double per_mm = 1000.0;  // N/m in 1 N/mm
+// Frequencies from slow swinging to those that are heard rather than felt. Amplitudes in µm from below any threshold to
+// shaking the arm.
 constexpr description::Range frequency_range = description::between(1.0, 2000.0);
 constexpr description::Range amplitude_range = description::between(1e-4, 1e4);
 constexpr double per_um = 1e-6;

@@ -8,8 +8,8 @@
 //     points:                      # 2 to 100, by frequency
 //       - {frequency_Hz: 10, amplitude_um: 3}
 //
-// A region is judged against a body with the region's stiffness. Pressures aren't judged: they depend on the parts'
-// shapes, which a cell file doesn't have.
+// A region is judged by trials with a body of the region's stiffness. Pressures aren't judged: they depend on the
+// shapes of the arm's parts, which a cell file doesn't have.
 #pragma once
 
 #include <filesystem>
@@ -22,20 +22,20 @@ namespace proxarm::assessment {
 struct Region {
   std::string name;
   double stiffness_N_per_m = 0.0;
-  double transient_N = 0.0;     // in the first half second of a contact
-  double quasi_static_N = 0.0;  // after that
+  double transient_N = 0.0;     // threshold for the first half second of a contact
+  double quasi_static_N = 0.0;  // threshold after the first half second
 };
 
-// The amplitude from which a hand notices a vibration of what it grasps.
+// The amplitudes from which on a hand notices a vibration of what it grasps.
 struct VibrationThreshold {
   struct Point {
     double frequency_Hz = 0.0;
-    double amplitude_m = 0.0;  // half of peak to peak
+    double amplitude_m = 0.0;  // half of the peak-to-peak amplitude
   };
   std::string source;
   std::vector<Point> points;  // at least two, by ascending frequency
 
-  // Interpolated between the points, both axes logarithmic; nullopt beyond them.
+  // Returns the amplitude, interpolated between the points on two logarithmic axes; nullopt beyond the points.
   [[nodiscard]] std::optional<double> amplitude_m(double frequency_Hz) const;
 };
 
@@ -46,10 +46,10 @@ struct Thresholds {
   std::optional<VibrationThreshold> vibration = std::nullopt;
 };
 
-// A contact counts as quasi-static from this time after its beginning on, in seconds.
+// A contact counts as quasi-static from this time after its beginning on, s.
 inline constexpr double quasi_static_from_s = 0.5;
 
-// Throws SetupError, which names file, line and key.
+// Throws SetupError, which names the file, the line and the key.
 Thresholds load_thresholds(const std::filesystem::path& file);
 
 }  // namespace proxarm::assessment

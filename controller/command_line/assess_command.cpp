@@ -14,11 +14,12 @@ namespace {
 
 constexpr int threshold_exceeded = 1;
 
-// Assumed for a cell that doesn't describe its brakes, and not from a data sheet. Holding brakes of servo motors take
-// about 10 to 100 ms to close. They hold about the motor's rated torque, a third to a half of its peak torque.
+// The brakes' delay, and their torque as a share of the drive's peak torque, for a cell that doesn't describe its
+// brakes. Both are assumed, not taken from a data sheet: holding brakes of servo motors take about 10 to 100 ms to
+// close, and hold about the motor's rated torque, which is a third to a half of the motor's peak torque.
 constexpr double assumed_brake_delay_s = 0.1, assumed_brake_share = 0.5;
 
-// Returns the number of drives for which something was assumed.
+// Fills in the assumed brakes. Returns the number of drives for which a value was assumed.
 int assume_brakes(description::Cell& cell) {
   int assumed = 0;
   for (description::DriveDescription& drive : cell.drives) {

@@ -1,4 +1,5 @@
-// The subcommands of proxarm. Each function returns the exit status and throws SetupError.
+// Declares the subcommands of proxarm. Each function returns the exit status and throws SetupError if a file, an option
+// or the set-up is wrong.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +20,8 @@ struct FileOptions {
 
 struct CheckFilesOptions {
   std::vector<std::filesystem::path> files;
-  std::filesystem::path scene;  // cells are checked with it; empty: with their default scenes
-  scenes::CheckOptions states;  // how scenes are tried
+  std::filesystem::path scene;  // with which cells are checked; empty: each cell's default scene
+  scenes::CheckOptions states;  // how the laws of a scene are tried
 };
 
 struct SetOptions {
@@ -41,7 +42,8 @@ struct ReplayOptions {
 
 struct SignalsOptions {
   std::filesystem::path folder;
-  bool contacts = false, frames = false;  // print the table of contacts, or the frames, instead of the signals
+  // Whether to print the table of contacts, or the frames, instead of the signals.
+  bool contacts = false, frames = false;
 };
 
 struct ScanOptions {
@@ -51,28 +53,29 @@ struct ScanOptions {
 
 struct ProveOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the controller's cell
   std::filesystem::path out;  // empty: beside the cell
-  bool bus_loss = false;      // test only what the drives do when the controller falls silent
+  bool bus_loss = false;      // test only how the drives stop when the controller falls silent
 };
 
 struct ZeroOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the controller's cell
   std::filesystem::path out;  // empty: beside the cell
 };
 
 struct IdentifyOptions {
   RunOptions run;
-  std::filesystem::path arm;  // cell of the simulated arm; empty: the same cell
-  bool joints = false;        // identify friction, rotors and gears of the joints instead of the load behind the sensor
-  bool compare = false;       // with the values in the cell and its zero file
-  bool write = false;         // into the cell and its zero file
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the controller's cell
+  // Identify friction, rotors and gears of the joints, instead of the load behind the sensor.
+  bool joints = false;
+  bool compare = false;  // compare the identified values with those in the cell and its zero file
+  bool write = false;    // write the identified values into the cell and its zero file
 };
 
 struct AssessOptions {
   RunOptions run;
-  std::filesystem::path thresholds;  // empty: the shipped file
+  std::filesystem::path thresholds;  // file of thresholds; empty: the shipped file
   int poses = 4;
 };
 
@@ -95,8 +98,8 @@ int schema_command(const SchemaOptions& options);
 int tune_command(const RunOptions& options);
 int prove_command(const ProveOptions& options);               // 1: not proven
 int zero_command(const ZeroOptions& options);                 // 1: the sensor wasn't tared
-int identify_command(const IdentifyOptions& options);         // 1: not identified, or different from the cell's values
-int identify_joints_command(const IdentifyOptions& options);  // 1: as above
+int identify_command(const IdentifyOptions& options);         // 1: not identified, or different from the cell
+int identify_joints_command(const IdentifyOptions& options);  // 1: not identified, or different from the cell
 int calibrate_command(const CalibrateOptions& options);       // 1: the poses don't fit one another
 int assess_command(const AssessOptions& options);             // 1: a threshold is exceeded
 

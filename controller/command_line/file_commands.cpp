@@ -45,10 +45,11 @@ void tell(const std::vector<std::string>& lines) {
   for (const std::string& line : lines) std::printf("%s\n", line.c_str());
 }
 
-// Checks Assumption 1 and the laws for each object and for the whole scene, and prints the worst figures. Returns what
-// the scene is, kUntouched if nothing was touched, or null if the scene is wrong.
 const char* const kUntouched = "nothing was touched";
 
+// Checks Assumption 1 and the laws of contact for each object and for the whole scene, and prints the worst errors.
+// Returns a text for people: what the scene is, or kUntouched if no object was touched. Returns null if the scene is
+// wrong.
 const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& options) {
   auto worst = scenes::CheckVerdict::fine;
   for (const scenes::CheckReport& report : scenes::check_scene(scene, options)) {
@@ -73,7 +74,7 @@ void tell_joined(const scenes::Scene& scene) {
   if (!plan.joined.empty()) std::printf("stand flush, and hold as one: %s\n", joined_text(scene, plan).c_str());
 }
 
-// Prints what the loader did with each mesh's faces, and where the mesh lies.
+// Prints for each mesh what the loader did with the faces, and where the mesh lies.
 void tell_meshes(const scenes::Scene& scene) {
   for (const scenes::Object& object : scene.objects) {
     const auto* const shape = std::get_if<scenes::MeshShape>(&object.shape);
@@ -86,7 +87,8 @@ void tell_meshes(const scenes::Scene& scene) {
   }
 }
 
-// Checks the laws of a point's 𝒢. Throws SetupError if the scene's tool can't be rendered with its objects.
+// Checks a scene file with a point as the tool. Throws SetupError if the scene's rigid tool can't be rendered with the
+// scene's objects.
 const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOptions& options) {
   if (scene.tool) {
     scenes::compile_rigid(scene, scene.tool->shape);
@@ -94,7 +96,8 @@ const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOpti
         "the laws of its objects, tried with a point; whether its tool fits is told by `proxarm check CELL --scene`\n",
         stdout);
   }
-  // Distances depend on where a tool starts, so they are judged only together with a cell.
+  // Whether an object is doubtfully far away depends on where the tool starts, so it is judged only together with a
+  // cell.
   const double anywhere_m = std::numeric_limits<double>::infinity();
   tell(controller::scene_doubts(scene, models::Vec3::Zero(), anywhere_m));
   if (!scene.tool) tell_joined(scene);
@@ -115,8 +118,8 @@ void require_simulable(const PreparedSession& session) {
   const sim::SimulatedCell far_end(session.cell, session.sensor, session.hand, network.events());
 }
 
-// Checks a cell with the files that it names: builds each device as the controller would, and refuses what `run` would
-// refuse.
+// Checks a cell together with the files that the cell names: builds each device as the controller would, and throws
+// SetupError for what `run` would refuse.
 void check_cell(const fs::path& file, const fs::path& scene) {
   const description::Cell cell = description::load_cell(file);
   if (!cell.default_scene.empty()) description::require_default_file(cell, "default_scene", cell.default_scene);
@@ -153,7 +156,7 @@ void tell_sources(const fs::path& file) {
   }
 }
 
-// Prints a mesh's defects; whether they matter depends on the scene. Returns what the mesh can be used for.
+// Prints a mesh's defects, which matter in some scenes only. Returns what the mesh can be used for.
 const char* tell_mesh(const fs::path& file) {
   const scenes::LoadedMesh loaded = scenes::load_mesh(file, {});
   tell(scenes::mesh_report(loaded));
@@ -227,8 +230,8 @@ int check_command(const CheckFilesOptions& options) {
 
 namespace {
 
-// Describes what a cycle of the default cell computes around 𝒢, counted in its default session. If the cell can't
-// render the scene, returns the reason.
+// Describes what a cycle computes besides 𝒢, counted in a session of the default cell with this scene. If the cell
+// can't render the scene, returns the reason.
 std::string explain_cycle(const fs::path& scene) {
   RunOptions options;
   options.scene = scene;

@@ -13,7 +13,8 @@ namespace proxarm::command_line {
 namespace {
 
 constexpr int not_identified = 1;
-// The arm swings at 10 Hz and above after each move. The mean over half a second is accurate to a few millinewtons.
+// Times to wait after each move, and to read the sensor. The arm swings at 10 Hz and above after a move; the mean of
+// the readings over half a second is accurate to a few millinewtons.
 constexpr double settle_s = 0.7, read_s = 0.5;
 
 PreparedSession prepared_to_identify(const RunOptions& options) {
@@ -41,7 +42,7 @@ ProofOutcome read(const PreparedSession& session, const IdentifyOptions& options
 IdentifiedTool identified(PreparedSession session, const IdentifyOptions& options) {
   IdentifiedTool tool;
   tool.allowances = identification::allowances_of(session.settings.zero_drift_N);
-  // The load behind the sensor is unknown, so any first reading is accepted.
+  // The load behind the sensor is unknown, so the tare may differ from the known zero by any force.
   session.settings.zero_drift_N = std::numeric_limits<double>::infinity();
   const models::Arm arm(session.cell);
   const auto stations = identification::tool_stations(session.cell, arm, arm.motor_from_link(arm.start_rad()));

@@ -22,8 +22,8 @@ constexpr int no_figure = 1;
       {.file = session.cell.file.string(), .key = "identify --joints", .found = found, .expected = expected});
 }
 
-// Drives send their torques if their PDO has room behind the position. A drive that can't send them says so at bring-up
-// and is then used without.
+// Asks each drive for its torque if the drive's PDO has room for it behind the position. A drive that can't send the
+// torque reports that at bring-up, and is then used without its torque.
 void ask_for_torques(description::Cell& cell) {
   constexpr int classic_bytes = 8;
   for (description::DriveDescription& drive : cell.drives) {

@@ -1,6 +1,6 @@
-// proxarm's command line: the only file that knows the controller, the field bus and the simulated arm.
+// Defines proxarm's command line: the commands, their options and the help.
 //
-// Exit status: 0 fine, 1 a fault ended the run or the arm oscillated, 2 set-up mistake.
+// Exit status: 0: fine; 1: a fault ended the run, or the arm oscillated; 2: set-up mistake.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -159,7 +159,8 @@ void add_calibrate_options(CLI::App& app, command_line::CalibrateOptions& option
   add_arm_option(app, options.arm);
 }
 
-// The commands with their options. `chosen` holds the command to run.
+// Adds all commands with their options to proxarm's command line. After parsing, `chosen` runs the command that the
+// user chose.
 class Commands {
  public:
   explicit Commands(CLI::App& app) : app_(app) {
@@ -168,7 +169,7 @@ class Commands {
     add_orders();
     add_files();
     add_judges();
-    // These are separate programs; see become().
+    // The next three commands are separate programs (become()); they are added for the help.
     app_.add_subcommand("new-cell", "a cell of your own arm out of its URDF or xacro: runs at once in simulation");
     app_.add_subcommand("study", "accuracy, stability and speed measured: CSV, JSON and plots");
     app_.add_subcommand("view", "a recorded session or a black box in the browser");
@@ -411,8 +412,9 @@ int run(int argc, char** argv) {
   return commands.chosen();
 }
 
-// Replaces this process by another program in the same folder. Such programs keep proxarm quick to build and small in
-// memory. If the program is missing, the error says what it is for (`missing`) and which command builds it (`builder`).
+// Replaces this process by another program in proxarm's folder. Separate programs keep proxarm quick to build and small
+// in memory. If the program is missing, throws a SetupError that says what the program does (`missing`) and which
+// command builds the program (`builder`).
 int become(const char* name, std::vector<char*> words, const char* missing, const char* builder) {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").replace_filename(name);
   words.push_back(nullptr);

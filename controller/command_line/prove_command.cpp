@@ -24,7 +24,7 @@ PreparedSession prepared(const RunOptions& options) {
   RunOptions run = options;
   run.scene = shipped_file("scenes/free.yaml");
   PreparedSession session = prepare(run);
-  // The proof is to find the sensor's mounting and zero, so neither is taken as known.
+  // The proof tests the sensor's mounting and zero, so the tare isn't compared with a known zero.
   session.settings.zero_drift_N = std::numeric_limits<double>::infinity();
   if (!session.impedance()) return session;
   throw description::SetupError({.file = session.cell.file.string(),
@@ -33,7 +33,8 @@ PreparedSession prepared(const RunOptions& options) {
                                  .expected = "one whose drives take positions"});
 }
 
-// A hand in another process can't hear what the proof asks for.
+// Explains how to get a simulated hand that pushes as the proof asks, because a hand in another process doesn't know
+// what the proof asks for.
 void tell_of_helper() {
   std::fprintf(
       stderr,

@@ -23,7 +23,7 @@ using description::SetupError;
 
 constexpr int other_setpoints = 1;
 
-// A Modbus line without a device; its answers come from the record.
+// A Modbus line without a device. The record gives the devices' answers instead.
 class NoLine final : public fieldbus::ModbusClient {
  public:
   fieldbus::ModbusResult transact(const fieldbus::ModbusMessage&, fieldbus::ModbusMessage&) noexcept override {
@@ -68,7 +68,8 @@ class Replay {
                       .expected = std::to_string(state.bytes()) + ", as this version's controller has it"});
   }
 
-  // Returns the first setpoint that differs from the record, if there is one.
+  // Replays all cycles up to the first setpoint that differs from the record. Returns the difference, or nullopt if
+  // there is none.
   std::optional<Difference> run() {
     BoxCycle recorded;
     std::vector<BoxFrame> frames;

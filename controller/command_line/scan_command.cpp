@@ -23,7 +23,8 @@ int scan_command(const ScanOptions& options) {
   std::printf("%s", fieldbus::scan_text(result, settings).c_str());
   const bool found = !result.nodes.empty() || result.sensor_gauges.has_value();
   if (!found && result.heard.empty()) {
-    // A controller alone on its bus counts an error for each attempt to send, up to this state.
+    // Whether nobody acknowledges what was sent. If no other device is on the bus, each attempt to send counts as an
+    // error, until the interface is error passive.
     const bool unacknowledged = network.bus(0).status().state == fieldbus::BusState::error_passive;
     std::printf(
         "Nothing is heard and nothing answers%s: are the devices powered, is the bitrate theirs, are CAN_H and "

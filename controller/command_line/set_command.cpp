@@ -10,7 +10,7 @@
 namespace proxarm::command_line {
 namespace {
 
-// One line for all changes: the session makes all of them or none.
+// Returns one line with all changes. The session makes all changes of a line, or none.
 std::string line_of(const std::vector<std::string>& changes) {
   std::string line;
   for (const std::string& change : changes) {

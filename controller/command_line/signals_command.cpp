@@ -19,7 +19,7 @@ using description::SetupError;
 
 constexpr std::size_t piece_bytes = 1 << 16;
 
-// Returns whether the text was written. If it wasn't, run_program reports that at the end.
+// Returns whether the text was written. If it wasn't, run_program() reports the failure at the end.
 bool print(std::string_view text) { return std::fwrite(text.data(), 1, text.size(), stdout) == text.size(); }
 
 void print_text(const fs::path& file) {

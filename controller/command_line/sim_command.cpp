@@ -18,7 +18,8 @@ namespace proxarm::command_line {
 
 namespace {
 
-// Returns the hand at the handle. For a proof that is a hand without force: a helper pushes as the proof asks.
+// Returns the hand at the handle. For a proof, returns a hand without force, because a helper pushes as the proof asks
+// instead.
 description::HandDescription hand_of(const PreparedSession& session, const RunOptions& options) {
   if (!options.for_proof) return session.hand;
   if (!options.hand.empty()) {
@@ -32,7 +33,8 @@ description::HandDescription hand_of(const PreparedSession& session, const RunOp
   return nobody;
 }
 
-// Two devices with one node number would both answer requests to it.
+// Throws SetupError if a device with the node number of a simulated drive is already on the drive's bus: both devices
+// would answer a request to that node.
 void require_nobody_plays(const description::Cell& cell, fieldbus::CanNetwork& network,
                           const std::vector<std::size_t>& interface_of_bus) {
   std::vector<fieldbus::BusToLead> buses;
@@ -48,7 +50,7 @@ void require_nobody_plays(const description::Cell& cell, fieldbus::CanNetwork& n
 
 }  // namespace
 
-// Runs until a signal, or until the reader of its output is gone.
+// Runs until a signal comes, or until the reader of the output is gone.
 int sim_command(const RunOptions& options) {
   if (options.bus.simulated()) {
     throw description::SetupError({.key = "--bus",

@@ -41,7 +41,7 @@ void SimView::add(const sim::Truth& truth) noexcept {
   record.force_S_N = controller::triple(truth.sensor_wrench_S.force);
   record.torque_S_Nm = controller::triple(truth.sensor_wrench_S.torque);
   record.force_W_N = record.hand_force_W_N = controller::triple(truth.hand_force_W);
-  // There is no proxy: a line from tool to proxy then has length 0.
+  // There is no proxy. Its place is set to the tool's, so a line drawn from tool to proxy has length 0.
   record.tool_W_m = record.proxy_W_m = record.p_hat_W_m = controller::triple(truth.X_WT.translation());
   for (std::size_t axis = 0; axis < plant.axis_count() && axis < controller::max_axes; ++axis) {
     record.actual_counts[axis] = plant.servo(axis).position_counts();

@@ -1,5 +1,6 @@
 // `proxarm sim --view`: shows the simulated arm in a browser, with what the simulation knows: arm, drives, hand and
-// load on the sensor. The proxy and its contacts belong to the controller, which is another process.
+// load on the sensor. The proxy and its contacts aren't shown, because the controller that knows them is another
+// process.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,8 @@ class SimView {
   // Starts the process that shows the arm. Precondition: no other thread runs yet. Throws SetupError.
   SimView(const PreparedSession& session, const RunOptions& options);
 
-  // Shows every millisecond of this arm from now on. Precondition: the arm doesn't move after this object is destroyed.
+  // Shows this arm's state once a millisecond from now on. Precondition: `cell` doesn't move after this view is
+  // destroyed.
   void watch(sim::SimulatedCell& cell);
 
  private:
@@ -25,7 +27,8 @@ class SimView {
   controller::BlackBox box_;
   ViewProcess process_;
   sim::SimulatedCell* cell_ = nullptr;
-  std::int64_t begun_ns_ = 0, next_ns_ = 0;  // time of the first cycle shown, and of the next one
+  // Times of the first cycle that was shown, and of the next cycle to show.
+  std::int64_t begun_ns_ = 0, next_ns_ = 0;
 };
 
 }  // namespace proxarm::command_line

@@ -10,7 +10,7 @@
 namespace proxarm::command_line {
 namespace {
 
-// About as fast as a person can read.
+// Time between two lines of --watch. A person can't read much faster.
 constexpr auto watch_every = std::chrono::milliseconds(250);
 
 }  // namespace

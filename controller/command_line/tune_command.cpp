@@ -44,7 +44,7 @@ std::optional<controller::DampedMass> damping_needed(const HandModel& hand, cons
                                    [&](const LoopModel& damped) { return smallest_with_margins(hand, damped); });
 }
 
-// The smallest stable mass if one part of the loop were ideal.
+// The smallest stable mass (handle included) that the loop would have if one part of the loop, `what`, were ideal.
 struct Limit {
   const char* what;
   std::optional<double> mass_without;
@@ -83,7 +83,8 @@ std::vector<Limit> limits(const PreparedSession& session, const LoopModel& loop,
   return list;
 }
 
-// Returns the largest timestep that drives hold exactly and up to which the wanted mass has its margins.
+// Returns the largest timestep at which `mass_kg` is stable with margins, as it is at all smaller ones. Only timesteps
+// that drives can hold exactly are tried.
 std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const LoopModel& loop) {
   std::optional<double> largest;
   for (const double ms : {0.1, 0.2, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 8.0, 10.0, 20.0}) {
@@ -97,8 +98,8 @@ std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const 
   return largest;
 }
 
-// Shows the current search on a terminal: the whole takes some seconds, a dozen with an inertia. Texts fit a line of 80
-// columns.
+// Shows on a terminal what is being searched, because `tune` takes some seconds, and a dozen with an inertia. Texts fit
+// a line of 80 columns.
 class Stages {
  public:
   // Shows `what` until the next stage begins or something is printed.
@@ -109,7 +110,7 @@ class Stages {
   void done() { progress_.clear(); }
 
  private:
-  static constexpr int most = 13;  // stages at most
+  static constexpr int most = 13;  // largest number of stages
   controller::Progress progress_{most, stderr, "steps"};
   int begun_ = 0;
 };
@@ -119,7 +120,8 @@ std::string in_poses(const std::string& what, std::size_t poses) {
 }
 std::string trying(const std::string& what) { return "trying " + what; }
 
-// The input of the advice: the hand as described, and the loop in all poses that the hand leads to.
+// The input of the advice: the hand as its file describes it, and the loop in all poses to which the hand leads the
+// arm.
 struct Tuned {
   const PreparedSession& session;
   HandModel hand;
@@ -147,7 +149,7 @@ void print_delays(const Tuned& of) {
 }
 
 void print_mass(const Tuned& of, const std::optional<double>& smallest) {
-  LoopModel start = of.session.loop;  // in the start pose
+  LoopModel start = of.session.loop;  // the loop in the start pose
   start.horizon_s = 0.0;
   const std::string at_start = mass_text(smallest_felt(of.hand, start));
   of.stages.done();
@@ -182,7 +184,8 @@ std::string inertia_text(const std::optional<double>& inertia_kg_m2) {
   return text.data();
 }
 
-// `also`: a further option that this inertia needs.
+// Tries an inertia of at least `least_kg_m2` on the simulated arm, and prints the advice. `also`: a further option that
+// this inertia needs.
 void print_tried_inertia(const PreparedSession& session, double least_kg_m2, const std::string& also, Stages& stages) {
   stages.begin(trying(inertia_text(least_kg_m2)));
   const TriedAdvice tried = tried_inertia(session, rounded_up(least_kg_m2));
@@ -198,8 +201,8 @@ void print_tried_inertia(const PreparedSession& session, double least_kg_m2, con
   std::printf("tried on the simulated arm: %s\n", tried.text.c_str());
 }
 
-// Prints the least of a few turning dampings with which some inertia is stable with margins. If K L > D (the hand's
-// stiffness, the loop delay, the hand's damping), every inertia needs additional damping.
+// Prints the smallest of six turning dampings with which some inertia is stable with margins. With the hand's stiffness
+// K, the hand's damping D and the loop delay L: if K L > D, no inertia is stable without additional damping.
 void print_turning_damping(PreparedSession session, Stages& stages) {
   stages.begin("inertia with more damping");
   const double own = session.settings.rotational_damping_Nms_per_rad;
@@ -217,7 +220,7 @@ void print_turning_damping(PreparedSession session, Stages& stages) {
               session.settings.mass_kg);
 }
 
-// Prints the inertia for a tool that is moved and turned at once, with the requested mass.
+// Prints the advised inertia for a tool that is moved and turned at once, with the requested mass.
 void print_inertia(const Tuned& of) {
   const PreparedSession& session = of.session;
   if (session.settings.orientation == controller::OrientationMode::held) return;
@@ -246,7 +249,7 @@ void print_tried_damping(const Tuned& of, const controller::DampedMass& damped) 
   std::printf("  tried: %s\n", tried.text.c_str());
 }
 
-// Precondition: without damping no mass has its margins.
+// Prints the least damping with which some mass is stable with margins. Precondition: without damping no mass is.
 void print_needed_damping(const Tuned& of) {
   of.stages.begin("damping with margins");
   const auto needed = damping_needed(of.hand, of.loop);
@@ -278,12 +281,14 @@ void print_damping(const Tuned& of) {
       of.loop.period_s * 20.0 / 0.1);
 }
 
-// Prints what limits the smallest mass, and returns the largest limit in words.
+// Prints by how much each part of the loop limits the smallest mass. Returns the part that limits the mass most, in
+// words.
 std::string print_limits(const Tuned& of, const std::optional<double>& smallest) {
   of.stages.begin(in_poses("what limits the mass", of.loop.arms->size()));
   const auto sorted = limits(of.session, of.loop, of.hand);
   of.stages.done();
-  constexpr double no_mass = 1e9, gain = 0.9;  // a gain below a tenth isn't worth naming
+  // A part of the loop is said to limit the mass if without that part the mass is smaller by a tenth or more (`gain`).
+  constexpr double no_mass = 1e9, gain = 0.9;
   const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
   const std::string limit = helps ? sorted.front().what : "none of these alone";
   std::printf("what limits it: %s; without %s the smallest stable mass would be %s\n", limit.c_str(),

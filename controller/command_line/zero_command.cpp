@@ -13,7 +13,7 @@ namespace {
 
 constexpr int not_found = 1;
 
-// Whatever the sensor reads is to be its zero, unless it varies.
+// Prepares a session that takes any reading of the sensor for the zero, unless the reading varies.
 PreparedSession prepared(RunOptions options) {
   options.scene = shipped_file("scenes/free.yaml");
   PreparedSession session = prepare(options);

@@ -37,8 +37,8 @@ class TemporaryFolder {
   fs::path path_;
 };
 
-// Runs `program script` in `folder` without a shell, with its output in "log" there. Returns an empty string on
-// success.
+// Runs `program` with the script plot.gp of `folder`, without a shell. The output goes to the file "log" in `folder`.
+// Returns an empty string on success, else a description of the problem.
 std::string run(const std::string& program, const fs::path& folder) {
   const std::string script = (folder / "plot.gp").string(), log = (folder / "log").string();
   std::array<char*, 3> arguments{const_cast<char*>(program.c_str()), const_cast<char*>(script.c_str()), nullptr};
@@ -86,7 +86,7 @@ std::string draw_svg(const std::string& gnuplot, const std::string& script, cons
   const std::string no_plot = "no plot: ";
   const TemporaryFolder folder;
   if (folder.path().empty()) return no_plot + "no temporary folder can be made";
-  // gnuplot reads and writes beside its script, independent of outside names.
+  // The script changes to its own folder, so gnuplot reads and writes only there, and no outside name is in the script.
   std::ofstream(folder.path() / "data") << data;
   std::ofstream(folder.path() / "plot.gp") << "cd " << gnuplot_string(folder.path().string()) << "\n" << script;
   const std::string problem = run(gnuplot, folder.path());

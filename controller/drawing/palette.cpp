@@ -10,7 +10,7 @@ namespace proxarm::controller {
 namespace {
 
 constexpr Colour table[] = {
-    // The page.
+    // Colours of the page.
     {"paper", "#f5f7f9", "#10151b"},
     {"card", "#ffffff", "#171e26"},
     {"ink", "#17202a", "#e8edf2"},
@@ -19,7 +19,7 @@ constexpr Colour table[] = {
     {"accent", "#0072b2", "#56b4e9"},
     {"world-top", "#eef2f6", "#1d2630"},
     {"world-bottom", "#d9e0e7", "#0d1217"},
-    // Proxy, tool, hand, contacts.
+    // Colours of proxy, tool, hand and contacts.
     {"proxy", "#0072b2", "#56b4e9"},
     {"tool", "#803000", "#ffc61a"},
     {"hand", "#561a7d", "#d849f5"},
@@ -27,16 +27,16 @@ constexpr Colour table[] = {
     {"slip", "#cc5500", "#ff8c42"},
     {"shade-stick", "#0072b222", "#56b4e926"},
     {"shade-slip", "#cc550026", "#ff8c422e"},
-    {"band", "#00724f1f", "#4fd1a524"},  // vibrations that a hand doesn't notice
+    {"band", "#00724f1f", "#4fd1a524"},  // range of vibrations that a hand doesn't notice
     {"good", "#00724f", "#4fd1a5"},
     {"bad", "#a3001f", "#ff5c72"},
     {"bad-paper", "#fdecea", "#3a1a1a"},
-    // Margin to instability, from the smallest to the largest.
+    // Colours of the margin to instability, from the smallest margin to the largest.
     {"margin-1", "#a3001f", "#ff5c72"},
     {"margin-2", "#b35900", "#ffc61a"},
     {"margin-3", "#0072b2", "#56b4e9"},
     {"margin-4", "#0b2e52", "#e8edf2"},
-    // Bodies, shaded by light; edges and grids keep them distinct.
+    // Colours of bodies, which light shades; edges and grids keep the bodies distinct.
     {"arm", "#e3e8ed", "#8fa0b1"},
     {"arm-joint", "#94a3b2", "#5d6e80"},
     {"arm-edge", "#51606f", "#0b1016"},

@@ -8,7 +8,7 @@ namespace {
 using models::JointVector;
 using models::Vec3;
 
-constexpr int places_of_path = 16;  // at most 20 mm apart
+constexpr int places_of_path = 16;  // number of checked places on a path, at most 20 mm apart
 
 bool allowed(const description::CellLimits& limits, const Vec3& place_W) {
   for (int axis = 0; axis < 3; ++axis) {

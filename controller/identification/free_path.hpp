@@ -1,4 +1,4 @@
-// Checks that the rendered point stays within workspace_m and out of keep_out_m between two poses of the motors.
+// Checks whether the rendered point stays within workspace_m and out of keep_out_m between two poses of the motors.
 #pragma once
 
 #include "models/arm/arm.hpp"

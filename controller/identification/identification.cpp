@@ -14,10 +14,11 @@ using models::Mat3;
 using models::Vec3;
 
 constexpr double twist_known_to = 0.2, friction_share = 0.02, linearity = 1e-3, resolution_share = 1e-3;
-// The tool twists the gears by some milliradians, known to a hundredth after the first round, then to 1e-4.
+// Number of rounds. The tool twists the gears by some milliradians; the twist is known to a hundredth after the first
+// round, to 1e-4 after the second.
 constexpr int rounds = 3;
 
-// Angles of links and twists of gears in a pose.
+// The links' angles and the gears' twists in a pose.
 struct Stand {
   JointVector link_rad, twist_rad;
 };
@@ -31,8 +32,8 @@ std::vector<Stand> stands_of(const models::Arm& arm, const std::vector<proof::Re
   return stands;
 }
 
-// How differently the sensor may be tilted in one pose than in another. A tilt common to all poses, as by the axis that
-// carries the arm, counts as a mounting error of the base.
+// Computes how much the sensor's tilt may differ from pose to pose. A tilt that is the same in all poses, such as the
+// tilt of the axis that carries the arm, counts as a mounting error of the base.
 class Tilts {
  public:
   Tilts(const description::Cell& cell, const models::Arm& arm, const std::vector<proof::Reading>& readings,
@@ -65,15 +66,18 @@ class Tilts {
   std::vector<bool> turns_;
 };
 
-// The standard deviation of the mean of n samples, from their steps Σ(xᵢ₊₁ − xᵢ)²: for white noise σ² = Σ/2(n − 1), and
-// the mean's deviation is σ/√n. Behind the sensor's low-pass, neighbours are correlated, φ = e^(−2π f T): steps are
-// smaller, σ²(1 − φ), and the mean's deviation is σ √((1 + φ)/((1 − φ) n)). A slowly swaying hand makes small steps and
-// so doesn't count as noise.
+// Returns the standard deviation of the mean of n samples. It follows from the steps between neighbouring samples, Σ =
+// Σ(xᵢ₊₁ − xᵢ)²:
+// 1. For white noise σ² = Σ/2(n − 1), and the mean's standard deviation is σ/√n.
+// 2. Behind the sensor's low-pass, neighbouring samples are correlated by φ = e^(−2π f T). The steps are then smaller,
+//    so σ² = Σ/2(n − 1)(1 − φ), and the mean's standard deviation is σ √((1 + φ)/((1 − φ) n)).
+//
+// A hand that sways slowly makes small steps, so its motion doesn't count as noise.
 double deviation_of_mean(const Vec3& step_squares, const proof::Reading& reading, double bandwidth_Hz) {
   const double n = reading.samples;
   if (n < 2.0) return 0.0;
   const double decay = 2.0 * std::numbers::pi * bandwidth_Hz * reading.lasted_s / n;
-  // If the sensor's filter is slower than the whole reading, this is one sample, not n.
+  // If the sensor's filter is slower than the whole reading, the n samples count as one.
   const double phi = bandwidth_Hz > 0.0 ? std::exp(-std::max(decay, 1.0 / n)) : 0.0;
   const double variance = step_squares.mean() / (2.0 * (n - 1.0) * (1.0 - phi));
   return std::sqrt(variance * (1.0 + phi) / ((1.0 - phi) * n));
@@ -141,7 +145,7 @@ ToolFit identify_tool(const description::Cell& cell, const std::vector<proof::Re
     if (!fit.centre_found) continue;
     Eigen::Map<Vec3>(with_tool.tool.centre_of_mass_S_m.data()) = fit.centre_S_m;
   }
-  // A mass that may be zero has no centre.
+  // A tool whose mass may be zero has no centre of mass.
   if (fit.mass_kg <= fit.mass_half_kg) fit.centre_found = false;
   return fit;
 }

@@ -12,15 +12,17 @@ using models::Mat3;
 using models::Vec3;
 
 constexpr std::size_t least_readings = 3;
-// A direction is identifiable if the mounting error is at most a fifth of the spread along it.
+// A direction is identifiable if the spread along it is more than five times the mounting error.
 constexpr double spread_over_mounting = 5.0;
-// Gauss-Newton's steps shrink like products of mounting errors, a hundredth each: four steps leave 1e-8.
+// Number of steps. Gauss-Newton's steps shrink like products of mounting errors, each a hundredth; four steps leave an
+// error of 1e-8.
 constexpr int steps = 6;
 
-// Standard deviation of c, m: no tool's centre is much further away. Without a tool, c would otherwise be unbounded.
+// Expected standard deviation of c, m: few tools have their centre further away. Without this, c would be
+// unbounded if there is no tool.
 constexpr double far_m = 1.0;
 
-// Unknowns of the forces: m, b, d, ε, δ. Of the torques: c, b', d'.
+// First index of each unknown. The fit of forces has m, b, d, ε, δ; the fit of torques has c, b', d'.
 constexpr int of_mass = 0, of_zero = 1, of_drift = 4, of_sensor = 7, of_base = 10, force_unknowns = 13;
 constexpr int of_centre = 0, of_torque_zero = 3, of_torque_drift = 6, torque_unknowns = 9;
 
@@ -36,7 +38,7 @@ Mat3 turned(const Vec3& by) {
   return Eigen::AngleAxisd(angle_rad, by / angle_rad).toRotationMatrix();
 }
 
-// Least squares with N unknowns, row by row: A = Σ JᵀJ/σ², a = Σ Jᵀr/σ².
+// Least squares with N unknowns, to which rows are added: A = Σ JᵀJ/σ², a = Σ Jᵀr/σ².
 template <int N>
 struct Normal {
   Eigen::Matrix<double, N, N> A = Eigen::Matrix<double, N, N>::Zero();
@@ -47,8 +49,8 @@ struct Normal {
     A += weight * J.transpose() * J;
     a += weight * J.transpose() * r;
   }
-  // Three unknowns from `first` on, now `x`, are expected to be 0 with this standard deviation; a deviation of 0 fixes
-  // them.
+  // Adds rows that expect the three unknowns from `first` on, which now are `x`, to be 0 with this standard deviation.
+  // A deviation of 0 fixes the unknowns at 0.
   void expect_zero(int first, const Vec3& x, double deviation) {
     constexpr double surely = 1e-9;  // N, Nm, rad: far below any sensor's accuracy
     const double weight = 1.0 / std::max(deviation * deviation, surely * surely);
@@ -71,8 +73,8 @@ struct Normal {
   }
 };
 
-// The upper 3e-5 of χ² with ν degrees of freedom (E. B. Wilson and M. M. Hilferty, The distribution of chi-square,
-// 1931): ν (1 − 2/9ν + z √(2/9ν))³, z = 4.
+// Returns the upper 3e-5 quantile of χ² with ν degrees of freedom (E. B. Wilson and M. M. Hilferty, The distribution of
+// chi-square, 1931): ν (1 − 2/9ν + z √(2/9ν))³ with z = 4.
 double most_chi_squared(double nu) {
   constexpr double z = 4.0;
   return nu * std::pow(1.0 - 2.0 / (9.0 * nu) + z * std::sqrt(2.0 / (9.0 * nu)), 3.0);
@@ -110,7 +112,7 @@ class Fit {
     const Vec3 drift = x_.segment<3>(of_drift), sensor = x_.segment<3>(of_sensor), base = x_.segment<3>(of_base);
     found.force.chi_squared += prior(drift, allowances_.zero_drift_N) + prior(sensor, allowances_.mounting_rad) +
                                prior(base, allowances_.mounting_rad);
-    // Nine rows are the expectations of nine unknowns.
+    // Nine of the rows are the expectations of nine unknowns.
     const double nu = 3.0 * static_cast<double>(readings_.size()) + 9.0 - force_unknowns;
     found.force.most = most_chi_squared(nu);
     const auto deviation = normal.covariance().diagonal().cwiseSqrt().eval();
@@ -128,7 +130,7 @@ class Fit {
     Normal<torque_unknowns> normal;
     const double drift_Nm = lever_m * allowances_.zero_drift_N;
     Eigen::Matrix<double, torque_unknowns, 1> y = Eigen::Matrix<double, torque_unknowns, 1>::Zero();
-    for (int n = 0; n < 2; ++n) {  // the second time with the lever known
+    for (int n = 0; n < 2; ++n) {  // the second time the lever is known
       lever_now_m_ = y.segment<3>(of_centre).norm();
       normal = {};
       for (const PoseReading& reading : readings_) {
@@ -159,7 +161,7 @@ class Fit {
     const double last_s = readings_.back().time_s, all_s = last_s - readings_.front().time_s;
     return all_s > 0.0 ? (reading.time_s - last_s) / all_s : 0.0;
   }
-  // The weight of one kilogram in S, including mounting errors.
+  // Returns the weight of one kilogram in S, including mounting errors.
   [[nodiscard]] Vec3 weight_of_1_kg(const PoseReading& reading) const {
     return turned(x_.segment<3>(of_sensor)) * (reading.R_SW * (turned(x_.segment<3>(of_base)) * gravity_W_));
   }
@@ -173,13 +175,13 @@ class Fit {
   [[nodiscard]] double force_deviation(const PoseReading& reading) const {
     return std::hypot(reading.noise_N, reading.tilt_rad * weight_N());
   }
-  // The measured weight adds the force's noise.
+  // The torque's model uses the measured weight, so its deviation includes the force's noise.
   [[nodiscard]] double torque_deviation(const PoseReading& reading) const {
     const double by_force_Nm = lever_now_m_ * reading.noise_N;
     return std::hypot(reading.noise_Nm, by_force_Nm, lever_m * reading.tilt_rad * weight_N());
   }
 
-  // m and b alone, with equal weights: F_k − F̄ = m (u_k − ū).
+  // Estimates m and b alone for the start, with equal weights for all readings: F_k − F̄ = m (u_k − ū).
   void start() {
     Vec3 force_mean = Vec3::Zero(), u_mean = Vec3::Zero();
     const double count = static_cast<double>(readings_.size());

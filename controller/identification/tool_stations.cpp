@@ -18,11 +18,12 @@ using models::Vec3;
 using proof::Station;
 
 constexpr std::size_t wrist_joints = 3;
-// Seven poses in addition to the first give 27 force readings for 13 unknowns; all 5,040 rounds can be tried. Fewer
-// than five aren't enough.
+// Number of poses in addition to the first. With seven, there are 27 force readings for 13 unknowns, and all 5,040
+// rounds can be tried. Fewer than five aren't enough.
 constexpr std::size_t chosen = 7, least_chosen = 5;
-constexpr double shares[] = {1.0, 0.5, 0.25, 0.125};  // shares of most_turn_rad that are tried for a joint
-// Poses whose weight directions are closer than this count as the same.
+// Shares of most_turn_rad that are tried for a joint.
+constexpr double shares[] = {1.0, 0.5, 0.25, 0.125};
+// Poses in which the weight's directions differ by less than this count as the same.
 constexpr double same = 1e-6;
 
 std::vector<Eigen::Index> wrist_of(const models::Arm& arm) {
@@ -39,8 +40,8 @@ Vec3 down_in_sensor(const description::Cell& cell, const models::Arm& arm, const
   return arm.sensor_pose(arm.link_from_motor(motor_rad)).linear().transpose() * down_W;
 }
 
-// How far a joint alone can turn to one side. A margin of the following error is kept to the ends of ranges, since a
-// drive may deviate by that without a fault.
+// Returns how far a joint alone can turn to one side, rad. The following error is kept as a margin to the ends of the
+// joint's range, since a drive may deviate by this without a fault.
 double turn_of(const description::Cell& cell, const models::Arm& arm, const JointVector& start, Eigen::Index joint,
                double side) {
   const auto& range = cell.drives[static_cast<std::size_t>(joint)].range_rad;
@@ -54,8 +55,8 @@ double turn_of(const description::Cell& cell, const models::Arm& arm, const Join
   return 0.0;
 }
 
-// All poses of the grid that the arm can reach from its pose and return from: each joint by its full turn and by half
-// of it.
+// Returns all poses of the grid that the arm can reach from its first pose. Each joint turns to either side by its full
+// turn, by half of it, or not at all.
 std::vector<JointVector> candidates(const description::Cell& cell, const models::Arm& arm, const JointVector& start) {
   std::vector<JointVector> poses{start};
   for (const Eigen::Index joint : wrist_of(arm)) {
@@ -83,14 +84,15 @@ Mat3 scatter_of(const std::vector<Vec3>& directions) {
   return squares - sum * sum.transpose() / static_cast<double>(directions.size());
 }
 
-// Adds to the start the poses that maximise the determinant.
+// Returns the start and the chosen poses, each of which maximises the determinant with the poses before it.
 std::vector<JointVector> best_of(const description::Cell& cell, const models::Arm& arm, const JointVector& start) {
   const std::vector<JointVector> poses = candidates(cell, arm, start);
   std::vector<Vec3> shown;
   for (const JointVector& pose : poses) shown.push_back(down_in_sensor(cell, arm, pose));
   std::vector<JointVector> taken{start};
   std::vector<Vec3> directions{down_in_sensor(cell, arm, start)};
-  // If the directions span fewer than three dimensions, the determinant is taken over these dimensions.
+  // Added to the scatter's diagonal. If the directions span fewer than three dimensions, determinants are then compared
+  // over the spanned dimensions alone.
   constexpr double little = 1e-4;
   for (std::size_t n = 0; n < chosen; ++n) {
     double most = 0.0;
@@ -111,7 +113,7 @@ std::vector<JointVector> best_of(const description::Cell& cell, const models::Ar
   return taken;
 }
 
-// The largest joint motion between each two poses; infinite if the path isn't free.
+// Returns the largest joint motion between each two poses; infinite if the path between them isn't free.
 Eigen::MatrixXd ways(const description::Cell& cell, const models::Arm& arm, const std::vector<JointVector>& poses) {
   const auto count = static_cast<Eigen::Index>(poses.size());
   Eigen::MatrixXd way = Eigen::MatrixXd::Zero(count, count);
@@ -125,8 +127,8 @@ Eigen::MatrixXd ways(const description::Cell& cell, const models::Arm& arm, cons
   return way;
 }
 
-// The shortest free round through all poses, from the first and back. If there is none, the arm returns to the first
-// pose each time; these paths are free by candidates().
+// Returns the shortest free round through all poses, from the first pose and back to it. If there is no free round, the
+// arm returns to the first pose each time; these paths are free by candidates().
 std::vector<std::size_t> round_of(const Eigen::MatrixXd& way) {
   std::vector<std::size_t> order(static_cast<std::size_t>(way.rows() - 1)), best;
   std::iota(order.begin(), order.end(), std::size_t{1});

@@ -15,8 +15,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// A TPDO and a setpoint per axis; SYNC, heartbeats, the sensor's poll and frames; doubled for other traffic on the
-// buses.
+// Returns for how many frames per cycle the box has room: a TPDO and a setpoint per axis, and eight for SYNC,
+// heartbeats and the sensor's poll and frames. The sum is doubled for other traffic on the buses.
 std::size_t frames_per_cycle(const description::Cell& cell) { return 2 * (2 * cell.drives.size() + 8); }
 
 template <std::size_t N>

@@ -26,10 +26,10 @@ BoxSize box_size(const command_line::PreparedSession& session, bool timestep_may
 // The folder of --black-box, else one in the folder of --record; empty: neither is given.
 std::filesystem::path black_box_folder(const command_line::RunOptions& options);
 
-// Returns the head of the session's replay, without first cycle and state. Throws SetupError.
+// Returns the head of the session's replay; its first cycle and state aren't filled in. Throws SetupError.
 ReplayHead replay_head(const command_line::PreparedSession& session, const std::vector<std::string>& bus_names,
                        const BusIndices& indices);
-// Returns all files from which the controller was made.
+// Returns all files from which the session was prepared.
 std::vector<std::filesystem::path> replay_files(const command_line::PreparedSession& session);
 
 enum class Replay : std::uint8_t { none, kept };

@@ -1,4 +1,4 @@
-// Writes session.mcap, with its stage, into a record's folder.
+// Writes session.mcap into a record's folder: the messages of all cycles, with the stage on which they are shown.
 #pragma once
 
 #include <filesystem>
@@ -11,9 +11,9 @@ namespace proxarm::controller {
 
 class RecordedMessages {
  public:
-  // Throws SetupError.
+  // Creates the file. Throws SetupError.
   RecordedMessages(const std::filesystem::path& folder, const command_line::PreparedSession& session);
-  // Takes a record that is complete, as SessionOutput::add() returns it.
+  // Writes a cycle. Precondition: the record is complete, as SessionOutput::add() returns it.
   void add(const CycleRecord& completed) { record_.add(completed); }
   void drain(const BoxReader& box) { record_.drain(box); }
   void finish() { record_.finish(); }

@@ -11,8 +11,8 @@ namespace proxarm::controller {
 
 namespace fs = std::filesystem;
 
-// Refuses a bad plot file before the run instead of after it. The file must end in .svg, so --plot can overwrite
-// nothing but a picture.
+// Throws before the run if the plot's file can't be written. Its name must end in .svg, so that --plot overwrites no
+// file but a picture.
 void require_plot_file(const fs::path& file) {
   if (file.empty()) return;
   const auto refuse = [&](const char* expected) {

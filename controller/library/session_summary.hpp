@@ -19,7 +19,7 @@ SummaryConfig summary_config(const command_line::PreparedSession& session);
 // Fills in what only the scene knows, distances and friction, after so much rendering.
 void complete(CycleRecord& record, const command_line::PreparedSession& session, std::int64_t rendered_ns);
 
-// Returns the session's length, and the longest release if no person can end one.
+// Returns the session's length. If no person can end a release, the length also has the longest time of a release.
 SessionLength session_length(const command_line::PreparedSession& session, const command_line::RunOptions& options);
 
 // What is rendered, in a few words: "4 kg felt"; and with scene and timestep, above a plot.

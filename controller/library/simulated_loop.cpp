@@ -19,7 +19,7 @@ using models::Vec3;
 // Faster than any tool by far; what explodes is there within some steps.
 constexpr double impossible_m_per_s = 1000.0;
 
-// Time for the last frames to reach the drives: the longest queue of a cycle takes a millisecond.
+// Time that the last frames have to reach the drives. The longest queue of a cycle takes a millisecond.
 constexpr std::int64_t last_words_ns = 5'000'000;
 
 constexpr std::size_t drained_after_every_cycle = 64;

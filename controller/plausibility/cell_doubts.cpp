@@ -28,7 +28,7 @@ void judge_pose(const std::string& key, const description::PoseDescription& pose
 void judge_gravity(const description::Cell& cell, Lines& lines) {
   const std::array<double, 3>& g = cell.gravity_W_m_per_s2;
   const double size = std::hypot(g[0], g[1], g[2]);
-  if (size == 0.0) return;  // an arm without weight, for tests
+  if (size == 0.0) return;  // an arm without gravity, for tests
   const std::string key = "gravity_W_m_per_s2";
   judge(key, size, {9.7, 9.9, "m/s²", {units::gravities, units::mm_per_s2, {"cm/s²", 1e-2}}}, lines);
   if (g[2] > -0.9 * size) {
@@ -38,7 +38,7 @@ void judge_gravity(const description::Cell& cell, Lines& lines) {
   }
 }
 
-// A joint, and the inertia that it moves at the start: kg m², or kg for a linear joint.
+// A joint's kind, and the inertia that the joint moves at the start: kg m², or kg for a linear joint.
 struct Joint {
   bool slides;
   double inertia;

@@ -1,8 +1,9 @@
-// Finds values in a session's files that are possible but probably not meant: another unit, gravity upside down, a
-// reversed gear. One line each, beginning with the file. They aren't errors, since some arm may be like that.
+// Finds values in a session's files that are possible but probably not meant, such as a value in another unit, gravity
+// upside down, or an inverted gear ratio. Each doubt is a line that begins with the file. Doubts aren't errors, since
+// an arm may really be like that.
 //
-// The bounds are wider than the values of all arms, hands and scenes shipped here or made by `new-cell`, and narrower
-// than the ratio of units that people confuse.
+// The bounds are wider than the values of all arms, hands and scenes that are shipped here or made by `new-cell`. They
+// are narrower than the ratios between units that people confuse.
 #pragma once
 
 #include <string>
@@ -16,7 +17,7 @@
 
 namespace proxarm::controller {
 
-// Precondition: `arm` is the cell's.
+// Precondition: `arm` is built from `cell`.
 std::vector<std::string> cell_doubts(const description::Cell& cell, const models::Arm& arm);
 
 std::vector<std::string> hand_doubts(const description::HandDescription& hand);
@@ -24,7 +25,8 @@ std::vector<std::string> hand_doubts(const description::HandDescription& hand);
 // Register numbers of a map that look as if they were counted from 40001, as in manuals.
 std::vector<std::string> register_doubts(const description::ModbusDriveDescription& drive);
 
-// start_W: the tool's start, m. reach_m: an upper bound on the distance of the arm's points from its base.
+// start_W: the tool's place at the start, m. reach_m: an upper bound of the distance of any of the arm's points from
+// the arm's base.
 std::vector<std::string> scene_doubts(const scenes::Scene& scene, const models::Vec3& start_W, double reach_m);
 
 }  // namespace proxarm::controller

@@ -18,7 +18,7 @@ std::string with_unit(const std::string& number, const char* unit) {
 
 bool is_within(double x, const Expected& expected) { return x >= expected.low && x <= expected.high; }
 
-// "; if it is in mm, write 0.02, if in …"
+// Returns "; if it is in mm, write 0.02, if in …".
 std::string readings(double value, const Measure& measure, const Expected& expected) {
   std::string text;
   for (const OtherUnit& other : expected.others) {

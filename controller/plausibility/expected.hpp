@@ -1,4 +1,4 @@
-// Usual ranges of keys, and units that a value outside its range may have been written in.
+// The usual range of a key, and units in which a value outside this range may have been written.
 #pragma once
 
 #include <numbers>
@@ -7,7 +7,7 @@
 
 namespace proxarm::controller {
 
-// Another unit that people use for this key: value × `in_key` is in the key's own unit.
+// Another unit that people use for a key. A value in this unit times `in_key` is in the key's own unit.
 struct OtherUnit {
   const char* name;
   double in_key;
@@ -23,23 +23,23 @@ inline constexpr OtherUnit mm{"mm", 1e-3}, mm_per_s{"mm/s", 1e-3}, mm_per_s2{"mm
 
 struct Expected {
   double low, high;
-  const char* unit;               // of the judged quantity; "": none
-  std::vector<OtherUnit> others;  // of the value in the file
+  const char* unit;               // unit of the judged quantity; "": none
+  std::vector<OtherUnit> others;  // other units of the value in the file
 };
 
-// A quantity that is judged instead of the value because it is more telling, such as the frequency that follows from a
-// stiffness: "with which what is behind it swings at 0.4 Hz".
+// A quantity that is judged instead of the value, because it is easier to judge than the value. For a stiffness it is
+// the resulting frequency: "with which what is behind it swings at 0.4 Hz".
 struct Measure {
-  const char* value_unit;  // of the value in the file
+  const char* value_unit;  // unit of the value in the file
   double found;
   double power;  // found ∝ value^power
   std::string says;
 };
 
-// Adds a line to `lines` if the value is out of range: "limits.leash_m: found 20 m, expected 0.0001 to 0.3; if it is in
-// mm, write 0.02". It names those other units in which the value would be in range.
+// Adds a line to `lines` if the value is out of its range: "limits.leash_m: found 20 m, expected 0.0001 to 0.3; if it
+// is in mm, write 0.02". The line names the other units in which the value would be in its range.
 void judge(const std::string& key, double value, const Expected& expected, std::vector<std::string>& lines);
-// The same for a measure of the value; `expected` is the measure's range.
+// Judges a measure of the value instead of the value; `expected` is the range of the measure.
 void judge(const std::string& key, double value, const Measure& measure, const Expected& expected,
            std::vector<std::string>& lines);
 

@@ -14,11 +14,11 @@ namespace {
 using models::Vec3;
 using Lines = std::vector<std::string>;
 
-// An object further from the tool's start than this many reaches of the arm is never touched.
+// Number of the arm's reaches. An object that is further from the tool's start than this is never touched.
 constexpr double far_reaches = 4.0;
 const Expected friction{0.0, 3.0, "", {{"percent", 1e-2}}};
 
-// A lower bound on the distance to a shape's surface; absent for a mesh, which has its own report.
+// Returns a lower bound of the distance to a shape's surface; absent for a mesh, since meshes have their own report.
 std::optional<double> distance_m(const scenes::Shape& shape, const Vec3& from_W) {
   if (const auto* plane = std::get_if<scenes::PlaneShape>(&shape)) {
     return std::abs(plane->normal.normalized().dot(from_W - plane->point_m));

@@ -58,7 +58,8 @@ void BusLossSession::run_cycle(std::int64_t t_k_ns) noexcept {
   act(t_k_ns);
   if (step_ == Step::silent) return;
   fieldbus::CanFrame heartbeat;
-  fieldbus::HeartbeatProducer same = parts_.drive_buses.front().heartbeat;  // those of all buses start in one cycle
+  // The heartbeats of all buses start in the same cycle, so one bus shows when they are due.
+  fieldbus::HeartbeatProducer same = parts_.drive_buses.front().heartbeat;
   heartbeat_was_last_ = same.due(t_k_ns, cycle_, heartbeat);
   bus_.send_setpoints(setpoints_, t_k_ns, cycle_);
   bus_.hand_over();
@@ -66,7 +67,8 @@ void BusLossSession::run_cycle(std::int64_t t_k_ns) noexcept {
   ++cycle_;
 }
 
-// Any fault or hold before the silence ends the session: the drives are switched off.
+// Judges faults and the enabling input before the silence. Any fault or hold ends the session: the drives are switched
+// off.
 void BusLossSession::heed(std::int64_t t_k_ns) noexcept {
   if (parts_.enabling) {
     parts_.enabling->on_cycle(t_k_ns);
@@ -97,7 +99,8 @@ void BusLossSession::act(std::int64_t t_k_ns) noexcept {
       supervisor_.handle(Event::tared);
       return go_to(Step::standing, t_k_ns);
     case Step::standing:
-      // The silence begins right after a heartbeat, the worst moment: drives that monitor it then wait longest.
+      // The silence begins right after a heartbeat, which is the worst time: drives that monitor the heartbeat then
+      // wait longest.
       if (in_step_ns >= standing_ns && heartbeat_was_last_) go_to(Step::silent, t_k_ns);
       return;
     case Step::farewell:
@@ -126,7 +129,8 @@ void BusLossSession::wait_for_drives(std::int64_t t_k_ns) noexcept {
   go_to(Step::farewell, t_k_ns);
 }
 
-// When the silence is judged, the frames of the last cycle have arrived; no drive reacts to these.
+// Receives frames during the silence. The first of them may come from the last cycle; no drive reacts to the silence in
+// these.
 void BusLossSession::listen(std::int64_t until_ns) noexcept {
   fieldbus::TimedFrame received;
   do {
@@ -149,10 +153,10 @@ void BusLossSession::go_to(Step step, std::int64_t t_k_ns) noexcept {
     bus_.request(fieldbus::DriveGoal::operation_enabled);
   } else if (step == Step::silent) {
     since_ns_ = silence_ns_ = last_word_ns_;
-    bus_.request(fieldbus::DriveGoal::none);  // sends no frame; the drives' reports no longer count as faults
+    bus_.request(fieldbus::DriveGoal::none);  // sends no frame; from now on, the drives' reports don't count as faults
   } else if (step == Step::farewell) {
     bus_.request(fieldbus::DriveGoal::none);
-    send_nmt(fieldbus::NmtCommand::start);  // for drives that have left NMT operational
+    send_nmt(fieldbus::NmtCommand::start);  // restarts drives that have left NMT operational
   }
 }
 

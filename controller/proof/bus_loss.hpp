@@ -1,13 +1,13 @@
-// Tests how each drive reacts when the controller dies: while the arm stands with its drives enabled, sending stops,
-// and the drives' answers are observed.
+// Tests how each drive reacts when the controller dies. While the arm stands with its drives enabled, sending stops,
+// and the drives' reactions are observed. The steps are:
 //
-//   waiting, enabling, taring, standing for 0.3 s   under the same supervision as any session
-//   silent for a second   no SYNC, setpoint, heartbeat or SDO; frames are only received. The silence begins right after
-//   a
-//                         heartbeat, the worst moment
-//   farewell              SYNC, heartbeat and controlwords again, until all drives are off or for half a second
+//   waiting, enabling, taring   as in any session, under the same supervision
+//   standing                    for 0.3 s, under the same supervision
+//   silent                      for a second: no SYNC, setpoint, heartbeat or SDO; frames are only received. This step
+//                               begins right after a heartbeat, which is the worst time
+//   farewell                    SYNC, heartbeat and controlwords again, until all drives are off, or for half a second
 //
-// If a drive switches off, its brake holds the axis or the axis sinks, as when a controller dies in a session.
+// If a drive switches off, its brake holds the axis, or the axis sinks, as when a controller dies in a session.
 // run_cycle() never allocates, locks, throws or prints.
 #pragma once
 
@@ -32,9 +32,9 @@ namespace proxarm::proof {
 // The reaction of one drive on CAN.
 struct OwnStop {
   std::string joint;
-  double reacts_s = -1.0;  // after the controller's last frame; negative: no reaction seen
-  double off_s = -1.0;     // when its statusword reported that it is off; negative: never
-  std::string signs;       // its reactions, in words
+  double reacts_s = -1.0;  // time since the controller's last frame; negative: the drive didn't react
+  double off_s = -1.0;     // when the drive's statusword reported that the drive is off; negative: never
+  std::string signs;       // the drive's reactions, in words
   bool off_at_last = false;
 };
 
@@ -48,18 +48,18 @@ class BusLossSession {
 
   void run_cycle(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool done() const noexcept { return step_ == Step::done; }
-  // Whether nothing is being sent; a late cycle then doesn't matter.
+  // Whether nothing is being sent. A late cycle then doesn't matter.
   [[nodiscard]] bool silent() const noexcept { return step_ == Step::silent; }
-  // Asks by SDO each drive that hasn't reported that it is off. A drive that refuses NMT start after the silence,
-  // because its stack holds an error, sends no TPDOs. Blocks; not for the cycle. Precondition: done().
+  // Asks each drive by SDO that hasn't reported that it is off. This is needed for drives that send no TPDOs after the
+  // silence: their stack holds an error, so they refuse NMT start. Blocks; not for the cycle. Precondition: done().
   void ask_the_others();
   void shut_down() noexcept { bus_.shut_down(controller::ns_of(settings_.period_s)); }
   void request_stop() noexcept { stop_.store(true); }  // any thread
-  // Whether the enabling switch must be released and pressed.
+  // Whether the person is asked to release and press the enabling switch.
   [[nodiscard]] bool asks_for_press() const noexcept { return asks_for_press_.load(); }
 
   // ---- after the last cycle
-  // The drives' reactions; empty if the session ended before the silence.
+  // Returns the drives' reactions; empty if the session ended before the silence.
   [[nodiscard]] std::vector<OwnStop> own_stops() const;
   [[nodiscard]] const controller::FaultReport& fault() const noexcept {
     return supervisor_.faulted() ? supervisor_.report() : supervisor_.held_for();
@@ -91,11 +91,11 @@ class BusLossSession {
   NoListener listener_;
   controller::Setpoints setpoints_;
   std::vector<fieldbus::SilenceWatch> watches_;
-  std::vector<fieldbus::DriveState> last_states_;  // of the drives on CAN, after ask_the_others()
+  std::vector<fieldbus::DriveState> last_states_;  // states of the drives on CAN, set by ask_the_others()
   Step step_ = Step::waiting;
   std::int64_t since_ns_ = 0, last_word_ns_ = -1;
-  bool heartbeat_was_last_ = false;  // the last cycle sent a heartbeat
-  std::int64_t silence_ns_ = -1;     // the time of the last cycle before the silence
+  bool heartbeat_was_last_ = false;  // whether the last cycle sent a heartbeat
+  std::int64_t silence_ns_ = -1;     // time of the last cycle before the silence
   std::atomic<bool> stop_{false}, asks_for_press_{false};
 };
 

@@ -1,4 +1,4 @@
-// A motion about a station with measurements during the motion, for callers that need more than readings at rest.
+// A motion about a station with measurements during the motion, for programs that need more than readings at rest.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +10,19 @@
 
 namespace proxarm::proof {
 
-// The cycle's measurements, before it sends its setpoints.
+// The measurements of a cycle, before the cycle sends its setpoints.
 struct Exercised {
   const controller::Measured& measured;
   std::span<const controller::DriveOnBus> drives;
 };
 
-// Called in the cycle: must not allocate, lock or throw.
+// The functions are called in the cycle, so they may not allocate, lock or throw.
 class Exercise {
  public:
   virtual ~Exercise() = default;
 
-  // The motors' offset from the station at this time of the exercise, rad. Zero and at rest at time 0 and from
-  // lasts_s() on.
+  // Returns the motors' offset from the station at this time of the exercise, rad. Precondition for implementations: at
+  // time 0, and from lasts_s() on, offset and speed are zero.
   [[nodiscard]] virtual models::JointVector offset_rad(std::size_t station, double time_s) const noexcept = 0;
   [[nodiscard]] virtual double lasts_s(std::size_t station) const noexcept = 0;
   virtual void take(std::size_t station, double time_s, const Exercised& cycle) noexcept = 0;

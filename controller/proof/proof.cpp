@@ -18,14 +18,15 @@ using models::JointVector;
 using models::Mat3;
 using models::Vec3;
 
-// A joint whose turn changes the reading by less than this share of the tool's weight is proven by pushes.
+// Share of the tool's weight. A joint is proven by pushes if turning the joint changes the reading by less than this
+// share.
 constexpr double shown_by_weight = 0.08;
 constexpr int poses_tried = 400;
 
 struct Mistake {
   std::string name;
-  std::function<JointVector(JointVector)> motors;  // maps the motors' angles by the cell to their true angles
-  Mat3 reading = Mat3::Identity();                 // maps the true force to the sensor's reading
+  std::function<JointVector(JointVector)> motors;  // maps the motors' angles by the cell to the motors' true angles
+  Mat3 reading = Mat3::Identity();                 // maps the true force to the sensor's reading of it
 };
 
 Mat3 turned(double angle_rad, const Vec3& axis) { return Eigen::AngleAxisd(angle_rad, axis).toRotationMatrix(); }
@@ -71,14 +72,14 @@ std::vector<Mistake> all_mistakes(const description::Cell& cell) {
   return mistakes;
 }
 
-// A unit vector along `along_W`, expressed in S.
+// Returns the vector `along_W` in S.
 Vec3 in_sensor(const models::Arm& arm, const JointVector& motor_rad, const Vec3& along_W) {
   return arm.sensor_pose(arm.link_from_motor(motor_rad)).linear().transpose() * along_W;
 }
 
 double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
-// The reading without a push at the station where `pushed` was read.
+// Returns the reading without a push at the pose where `pushed` was read; nullptr if there is none.
 const Reading* without_push(const std::vector<Reading>& readings, const Reading& pushed) {
   const Reading* found = nullptr;
   for (const Reading& other : readings) {
@@ -126,7 +127,7 @@ Explanation explain(const description::Cell& cell, const models::Arm& arm, const
   return {mistake.name, residual(arm, weight_W, readings, mistake), largest_angle(arm, readings, mistake)};
 }
 
-// For each joint, the change of the weight's direction in S when the joint is turned from this pose.
+// Returns for each joint how much the weight's direction in S changes if the joint is turned from this pose.
 JointVector shown(const description::Cell& cell, const models::Arm& arm, const JointVector& motor_rad) {
   const Vec3 down_W = Vec3(cell.gravity_W_m_per_s2.data()).normalized();
   const Vec3 here = in_sensor(arm, motor_rad, down_W);
@@ -139,7 +140,7 @@ JointVector shown(const description::Cell& cell, const models::Arm& arm, const J
   return changes;
 }
 
-// Chooses the pose that best shows its least visible joint. Joints that no pose nearby shows are left out.
+// Returns the pose in which the least visible joint is most visible. Joints that no pose nearby shows are left out.
 JointVector best_pose(const description::Cell& cell, const models::Arm& arm, const JointVector& motor_rad) {
   models::Random random(1);
   std::vector<JointVector> tried{motor_rad};
@@ -172,8 +173,9 @@ JointVector best_pose(const description::Cell& cell, const models::Arm& arm, con
   return tried[best];
 }
 
-// A mistake rivals the cell if its residual and angle are at most twice as large; both count at least as noise and a
-// careful hand's error.
+// Returns whether a mistake rivals the cell as it is: the mistake's residual and angle are at most twice as large as
+// the cell's. The cell's residual counts as at least the noise, the cell's angle as at least the error of a careful
+// hand.
 bool rivals(const Explanation& mistake, const Explanation& as_it_is) {
   constexpr double noise = 0.05, careful_rad = 0.07, clearly = 2.0;
   if (!as_it_is.explains()) return true;

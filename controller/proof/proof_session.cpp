@@ -13,9 +13,10 @@ using controller::Phase;
 using models::JointVector;
 using models::Vec3;
 
-// Paths stay at these shares of the speed limits, since T moves along arcs and drives overshoot.
+// Shares of the speed limits at which paths stay, since T moves along arcs and drives overshoot.
 constexpr double share_of_speed = 0.7, share_of_joint_speed = 0.25, peak_of_minimum_jerk = 15.0 / 8.0;
-// A force above push_N for steady_s is a push; below no_push_N the push is over.
+// A force above push_N that lasts for steady_s is a push. A force below no_push_N that lasts for steady_s is the push's
+// end.
 constexpr double push_N = 8.0, no_push_N = 2.0, steady_s = 0.3, push_timeout_s = 60.0;
 constexpr double run_out_s = 0.1, brakes_watched_s = 1.0, disable_timeout_s = 1.0;
 
@@ -78,7 +79,7 @@ void ProofSession::run_cycle(std::int64_t t_k_ns) noexcept {
   ++cycle_;
 }
 
-// Handles external events. A hold also ends the session, since nothing can be resumed here.
+// Handles events from outside. A hold ends the session, too, since nothing can be resumed here.
 void ProofSession::heed(std::int64_t t_k_ns) noexcept {
   if (stop_.load()) supervisor_.handle(Event::stop);
   if (parts_.enabling) {
@@ -124,7 +125,7 @@ void ProofSession::act(std::int64_t t_k_ns) noexcept {
       if (rate_ <= 0.0) supervisor_.handle(Event::at_rest);
       return;
     case Phase::disabling:
-      bus_.request(goal_off());  // a drive may have deviated meanwhile
+      bus_.request(goal_off());  // the goal may have changed, since a drive may have deviated in this phase
       return watch_brakes(in_phase_s);
     default:
       return;
@@ -188,7 +189,7 @@ void ProofSession::go_to(Step step) noexcept {
   asked_ = asks ? Asked::push : frees ? Asked::let_go : Asked::nothing;
 }
 
-// The minimum-jerk path (Flash and Hogan 1985): x = x₀ + (x₁ − x₀)(10 s³ − 15 s⁴ + 6 s⁵)
+// Follows the minimum-jerk path (Flash and Hogan 1985): x = x₀ + (x₁ − x₀)(10 s³ − 15 s⁴ + 6 s⁵).
 void ProofSession::move() noexcept {
   if (stations_.empty()) return;
   path_s_ = std::min(duration_s_, path_s_ + rate_ * settings_.period_s);
@@ -196,7 +197,7 @@ void ProofSession::move() noexcept {
   setpoints_.values = from_rad_ + s * s * s * (10.0 + s * (-15.0 + s * 6.0)) * way_rad_;
 }
 
-// Exercise time passes more slowly while the arm is being stopped.
+// Exercises. While the arm is being stopped, the time of the exercise passes more slowly.
 void ProofSession::exercise() noexcept {
   exercise_s_ += rate_ * settings_.period_s;
   setpoints_.values = stations_[station_].motor_rad + task_.exercise->offset_rad(station_, exercise_s_);
@@ -259,7 +260,7 @@ void ProofSession::read() noexcept {
   if (step_s_ < task_.read_s || g.samples == 0) return;
   const Station& station = stations_[station_];
   const Vec3 mean_S = g.sum_S.force / g.samples;
-  readings_.push_back({.station = station,  // begin_plan() reserved the memory
+  readings_.push_back({.station = station,  // begin_plan() has reserved the memory
                        .motor_rad = measured.motor_rad,
                        .force_S = mean_S,
                        .torque_S = g.sum_S.torque / g.samples,
@@ -282,7 +283,7 @@ void ProofSession::next_station() noexcept {
   begin_move(stations_[station_].motor_rad);
 }
 
-// The drives switch off and the brakes close; after that, no joint may move.
+// Waits until the drives are off and the brakes are closed. After that, no joint may move.
 void ProofSession::watch_brakes(double in_phase_s) noexcept {
   const JointVector& motor_rad = measurement_.now().motor_rad;
   if (!bus_.drives_off()) {

@@ -1,13 +1,14 @@
 // Runs the session that proves an arm, by small slow motions of each joint and by pushes, under the same supervision as
-// any session. With a Task it reads the resting arm at other stations.
+// any session. With a Task, the session reads the resting arm at other stations.
 //
-// After enabling and taring, the session follows its plan at each station: move, settle, exercise if there is one,
-// read; for a push: wait for it, read, wait for its end. Then it switches the drives off and watches the brakes for a
-// second.
+// After enabling and taring, the session goes through the stations of its plan. At each station: move, settle, exercise
+// if there is an exercise, read. At a station with a push: move, settle, wait for the push, read, wait for the push's
+// end. At the end, the session switches the drives off and watches the brakes for a second.
 //
-// The tool moves at proof_speed_m_per_s at most, and joints move on minimum-jerk paths from rest to rest. Any fault,
-// any hold and a released enabling input end the session: the motion runs out within a tenth of a second, and the
-// drives are switched off. run_cycle() never allocates, locks, throws or prints. begin_plan() does, between cycles.
+// The tool moves at proof_speed_m_per_s at most, and the joints move on minimum-jerk paths from rest to rest. Any
+// fault, any hold and a released enabling input end the session: the motion runs out within a tenth of a second, and
+// the drives are switched off. run_cycle() never allocates, locks, throws or prints. begin_plan() does so, between
+// cycles.
 #pragma once
 
 #include <atomic>
@@ -31,13 +32,13 @@
 
 namespace proxarm::proof {
 
-// The tool's speed limit. Paths are slower; a measured speed above 1.2 times this is tool_too_fast.
+// The tool's speed limit. Paths stay below it. A measured speed above 1.2 times this limit is the fault tool_too_fast.
 inline constexpr double proof_speed_m_per_s = 0.1;
 
-// What the person is asked to do; another thread may read it.
+// What the person is asked to do. Any thread may read it.
 enum class Asked : std::uint8_t { nothing, press, push, let_go };
 
-// The stations, computed from the motors' initial angles, and the times for settling and reading at each station.
+// The stations, computed from the motors' initial angles, and how long the arm settles and is read at each station.
 struct Task {
   std::function<std::vector<Station>(const models::JointVector& motor_rad)> stations;  // empty: plan()
   double settle_s = 0.4, read_s = 0.3;
@@ -52,8 +53,9 @@ class ProofSession {
   ProofSession& operator=(const ProofSession&) = delete;
 
   void run_cycle(std::int64_t t_k_ns) noexcept;
-  // Whether the arm stands and waits for its plan. begin_plan() makes it, and throws SetupError if none is possible.
+  // Whether the arm stands and waits for its plan.
   [[nodiscard]] bool needs_plan() const noexcept;
+  // Makes the plan. Throws SetupError if no plan is possible. Precondition: needs_plan().
   void begin_plan();
   [[nodiscard]] bool done() const noexcept { return supervisor_.phase() == controller::Phase::done; }
   void shut_down() noexcept { bus_.shut_down(controller::ns_of(settings_.period_s)); }
@@ -61,7 +63,7 @@ class ProofSession {
   // ---- any thread
   void request_stop() noexcept { stop_.store(true); }
   [[nodiscard]] Asked asked() const noexcept { return asked_.load(); }
-  // The station of the requested push, an index of readings and stations.
+  // Returns the station of the requested push, as an index of readings() and stations().
   [[nodiscard]] std::size_t station() const noexcept { return station_.load(); }
 
   // ---- between cycles
@@ -69,20 +71,20 @@ class ProofSession {
 
   // ---- after the last cycle
   [[nodiscard]] bool complete() const noexcept { return !readings_.empty() && station_ == stations_.size(); }
-  // Whether the session waited in vain for a push or for its end.
+  // Whether the session waited in vain for a push, or for the end of a push.
   [[nodiscard]] bool not_pushed() const noexcept { return not_pushed_; }
   [[nodiscard]] const std::vector<Reading>& readings() const noexcept { return readings_; }
-  // The fault that stopped the arm or caused the hold before; Fault::none: no fault.
+  // Returns the fault that stopped the arm, else the fault that caused the hold; Fault::none: no fault.
   [[nodiscard]] const controller::FaultReport& fault() const noexcept {
     return supervisor_.faulted() ? supervisor_.report() : supervisor_.held_for();
   }
-  // How far the joints moved on their brakes, rad; nullopt if the session ended before.
+  // Returns how far the joints moved on their brakes, rad; nullopt if the session ended before the brakes were watched.
   [[nodiscard]] std::optional<double> slipped_rad() const noexcept { return slipped_rad_; }
   [[nodiscard]] const controller::CycleParts& parts() const noexcept { return parts_; }
 
  private:
   enum class Step : std::uint8_t { moving, settling, exercising, waiting, reading, releasing };
-  // The samples of the present reading.
+  // The sum of the samples of the present reading, and what their accuracy needs.
   struct Gathered {
     models::Wrench sum_S, last_S, step_squares_S;
     int samples = 0;
@@ -132,7 +134,8 @@ class ProofSession {
   std::vector<Station> stations_;
   std::vector<Reading> readings_;
   Step step_ = Step::moving;
-  double step_s_ = 0.0, pressed_s_ = 0.0;  // the time in this step; the duration so far of a push or of its end
+  // step_s_: time in this step. pressed_s_: how long the push, or its end, has lasted so far.
+  double step_s_ = 0.0, pressed_s_ = 0.0;
   models::JointVector from_rad_, way_rad_;
   double duration_s_ = 0.0, path_s_ = 0.0, exercise_s_ = 0.0, rate_ = 1.0;
   models::Vec3 unpushed_S_ = models::Vec3::Zero();

@@ -13,9 +13,9 @@
 namespace proxarm::controller {
 namespace {
 
-// One second more than promised, since a replay starts at a state, and states are a second apart.
+// One second more than the box promises, since a replay starts at a state, and states are a second apart.
 constexpr double kept_s = BlackBox::seconds + 1.0;
-// Below 0.25 ms the box keeps no more cycles, which bounds the memory, and covers less time.
+// Below a period of 0.25 ms, the box keeps the same number of cycles, which bounds its memory, and covers less time.
 constexpr double shortest_period_s = 250e-6;
 
 }  // namespace
@@ -44,9 +44,9 @@ BlackBox::BlackBox(double period_s, std::size_t frames_per_cycle, Memory kind)
   }
   void* const memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, flags, descriptor_, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
-  // Populates all pages now, since the cycle may not have page faults: in one call from kernel 5.14 on, because page by
-  // page takes seconds on User-Mode Linux. memset() then writes them: on processors without dirty bits (User-Mode
-  // Linux, some ARM) the first write to a page is a fault even after a read.
+  // Populates all pages now, since the cycle may not have page faults. From kernel 5.14 on, madvise() does this in one
+  // call: page by page it would take seconds on User-Mode Linux. memset() then writes all pages: on processors without
+  // dirty bits (User-Mode Linux, some ARM), the first write to a page is a fault even after a read.
   (void)madvise(memory, bytes_, MADV_POPULATE_WRITE);
   std::memset(memory, 0, bytes_);
   Head* const head = new (memory) Head;
@@ -120,7 +120,7 @@ void BlackBox::finish_state(std::size_t bytes) noexcept {
   head_->states.store(at + 1, std::memory_order_release);
 }
 
-// One entry fewer than the capacity, since the next one may be in writing.
+// Counts one entry fewer than the capacity, since the cycle may be writing the next entry.
 std::uint64_t BoxReader::oldest_cycle() const noexcept {
   const std::uint64_t end = cycles();
   std::uint64_t oldest = end > head_->cycle_capacity - 1 ? end - (head_->cycle_capacity - 1) : 0;

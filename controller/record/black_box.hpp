@@ -1,13 +1,13 @@
 // Keeps the last ten seconds of a session in memory: the cycle's input and output, and the controller's state.
 //
 // The cycle writes here (noexcept, no lock, no allocation, no system call; every page is touched beforehand). The
-// memory is a shared mapping: a process forked earlier keeps it when this process dies
-// (command_line/black_box_keeper.hpp), and a process that gets the descriptor can read it (MappedBox). Four rings,
-// overwritten from their oldest end:
-//   cycles   one entry per cycle: its input beside frames, and the cycle's record
+// memory is a shared mapping. So a process that was forked from this one keeps the memory when this process dies
+// (command_line/sessions/black_box_keeper.hpp), and a process that gets the descriptor can read the memory (MappedBox).
+// There are four rings, each overwritten from its oldest end:
+//   cycles   one entry per cycle: the cycle's input apart from frames, and the cycle's record
 //   frames   all received and sent frames, in order
-//   truths   in simulation: the true pose of the tool, which the cycle doesn't know; written for viewers
-//   states   the controller's whole state at the beginning of a cycle, once a second, where a replay can start
+//   truths   in simulation: the tool's true pose, which the cycle doesn't know; written for viewers
+//   states   the controller's whole state at the beginning of a cycle, once a second; a replay can start at each state
 #pragma once
 
 #include <array>
@@ -30,7 +30,8 @@ inline constexpr std::size_t max_buses = 8;
 
 struct BoxFrame {
   fieldbus::CanFrame frame;
-  std::int64_t time_ns = 0;  // received: time on the wire; sent: when it was handed to the interface
+  // Received frame: time on the wire. Sent frame: time when it was handed to the interface.
+  std::int64_t time_ns = 0;
   std::uint8_t bus = 0;
   bool sent = false;
   fieldbus::SendResult result = fieldbus::SendResult::sent;
@@ -43,7 +44,7 @@ struct BusInput {
 
 struct BoxCycle {
   std::int64_t t_k_ns = 0;
-  std::uint64_t first_frame = 0;  // in the ring of frames, counted from the first cycle
+  std::uint64_t first_frame = 0;  // in the ring of frames, counted from the session's first frame
   std::uint32_t frames = 0;
   std::uint32_t overruns_in_a_row = 0;
   bool stop_requested = false;
@@ -57,9 +58,9 @@ struct BoxCycle {
   CycleRecord record;
 };
 
-// The true pose of a simulated tool in W at the beginning of a cycle.
+// A simulated tool's true pose in W at the beginning of a cycle.
 struct BoxTruth {
-  std::uint64_t cycle = 0;  // counted from the first one
+  std::uint64_t cycle = 0;  // number of the cycle, counted from the first one
   Triple tool_m{};
   std::array<double, 4> tool_q{0.0, 0.0, 0.0, 1.0};  // x y z w
 };
@@ -75,16 +76,17 @@ class CycleBox {
   CycleBox& operator=(const CycleBox&) = delete;
   virtual ~CycleBox() = default;
 
-  // Begins an entry; the caller fills all of it.
+  // Begins an entry. The caller fills every field of the entry.
   [[nodiscard]] virtual BoxCycle& begin(std::int64_t t_k_ns) noexcept = 0;
   virtual void add(const BoxFrame& frame) noexcept = 0;
   virtual void finish() noexcept = 0;
-  // Returns memory for a state if one is due, else an empty span. Called before the first frame of the cycle.
+  // Returns memory for a state if a state is due, else an empty span. Precondition: called before the cycle's first
+  // frame.
   [[nodiscard]] virtual std::span<std::byte> state_room() noexcept = 0;
   virtual void finish_state(std::size_t bytes) noexcept = 0;
 };
 
-// Read access for any thread or process while the cycle writes: whole cycles only.
+// Read access for any thread or process while the cycle writes. Only whole cycles are read.
 class BoxReader {
  public:
   static constexpr std::size_t most_state_bytes = 16384;
@@ -93,18 +95,19 @@ class BoxReader {
   BoxReader& operator=(const BoxReader&) = delete;
 
   [[nodiscard]] std::uint64_t cycles() const noexcept { return head_->cycles.load(std::memory_order_acquire); }
-  // Returns false if the cycle has been overwritten, also while copying.
+  // Reads a cycle with its frames. Returns false if the cycle isn't complete yet, or has been overwritten, even during
+  // the copying.
   bool read(std::uint64_t cycle, BoxCycle& out, std::vector<BoxFrame>& frames) const;
-  // The same without its frames.
+  // Reads a cycle without its frames. Returns false as above.
   bool read(std::uint64_t cycle, BoxCycle& out) const noexcept;
   [[nodiscard]] std::uint64_t oldest_cycle() const noexcept;
-  // Number of cycles with a true pose; 0: none is written.
+  // Returns the number of cycles with a true pose; 0: no true pose is written.
   [[nodiscard]] std::uint64_t truths() const noexcept { return head_->truths.load(std::memory_order_acquire); }
-  // Returns false if it isn't there, or not any more.
+  // Reads a cycle's true pose. Returns false if the pose isn't written yet, or has been overwritten.
   bool truth(std::uint64_t cycle, BoxTruth& out) const noexcept;
-  // Returns the oldest state from which all cycles are still there; false if there is none.
+  // Finds the oldest state after which all cycles are still in the box. Returns false if there is no such state.
   bool oldest_state(std::uint64_t& cycle, std::vector<std::byte>& state) const;
-  // The frames of a cycle that began and never ended.
+  // Returns the frames of the cycle that has begun and hasn't ended.
   [[nodiscard]] std::vector<BoxFrame> unfinished() const;
 
  protected:
@@ -115,12 +118,12 @@ class BoxReader {
   };
   static constexpr std::size_t state_count = 16;
   struct Head {
-    std::uint64_t layout = 0;  // layout_of_this_program() of the program that wrote the box
+    std::uint64_t layout = 0;  // layout_of_this_program() in the program that wrote the box
     std::uint64_t cycle_capacity = 0, frame_capacity = 0;
     std::atomic<std::uint64_t> cycles{0}, frames{0}, states{0}, truths{0};
   };
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
-  // Another build may have records of another size.
+  // Returns a number that differs between builds whose records differ in size.
   [[nodiscard]] static std::uint64_t layout_of_this_program() noexcept {
     return sizeof(BoxCycle) << 32U | sizeof(BoxFrame);
   }
@@ -146,11 +149,13 @@ class BlackBox final : public CycleBox, public BoxReader {
   static constexpr double seconds = 10.0;
 
   enum class Memory : std::uint8_t {
-    forked,         // for forked processes
-    by_descriptor,  // also for any process that gets descriptor(); counts against a limit of file sizes
+    forked,  // for processes forked from this one
+    // The memory is for any other process, too, that gets descriptor(). This memory counts against a limit of file
+    // sizes.
+    by_descriptor,
   };
 
-  // `frames_per_cycle`: the largest expected number.
+  // `frames_per_cycle`: the largest expected number of frames in a cycle.
   BlackBox(double period_s, std::size_t frames_per_cycle, Memory memory = Memory::forked);
   ~BlackBox() override;
 
@@ -159,10 +164,11 @@ class BlackBox final : public CycleBox, public BoxReader {
   void finish() noexcept override;
   [[nodiscard]] std::span<std::byte> state_room() noexcept override;
   void finish_state(std::size_t bytes) noexcept override;
-  // Adds the newest cycle's true pose; called by the simulation after the cycle.
+  // Adds the newest cycle's true pose. The simulation calls this after the cycle.
   void add_truth(const Triple& tool_m, const std::array<double, 4>& tool_q) noexcept;
 
-  // With Memory::by_descriptor: closed on exec, and with the box; else −1.
+  // Returns the descriptor of the memory with Memory::by_descriptor, else −1. It is closed on exec, and when the box is
+  // destroyed.
   [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
 
  private:
@@ -171,7 +177,7 @@ class BlackBox final : public CycleBox, public BoxReader {
   int descriptor_ = -1;
 };
 
-// Another process's box, mapped read-only through its descriptor.
+// Another process's black box, mapped read-only through the box's descriptor.
 class MappedBox final : public BoxReader {
  public:
   // Throws std::runtime_error if the memory isn't a box of this build of the program.

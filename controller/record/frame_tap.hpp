@@ -1,7 +1,8 @@
 // Passes another network's traffic through unchanged, and copies every frame to a ring.
 //
-// For records on real interfaces, where nothing else sees all frames. Sent frames have the time of send(), or the time
-// given to send_all(): earlier than on the wire, by the wait in the interface's queue and on the bus.
+// The tap is for records on real interfaces, where nothing else sees all frames. A sent frame has the time of send(),
+// or the time given to send_all(). The frame is on the wire later than this time, by its wait in the interface's queue
+// and on the bus.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Counts the calling thread's page faults. Each costs a microsecond (minor) or, from a disk, milliseconds (major), so a
-// cycle on time must have none. Locked memory (mlockall) has none.
+// Counts the calling thread's page faults. A minor page fault costs a microsecond, a major one (from a disk)
+// milliseconds. So a cycle that is to be on time may have no page fault; with locked memory (mlockall) there are none.
 #pragma once
 
 #include <sys/resource.h>
@@ -16,7 +16,7 @@ struct PageFaults {
   }
 };
 
-// A system call.
+// Returns the calling thread's page faults so far, by a system call.
 inline PageFaults thread_page_faults() noexcept {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);

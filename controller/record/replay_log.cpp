@@ -13,7 +13,8 @@ namespace {
 namespace fs = std::filesystem;
 using description::SetupError;
 
-// Upper bound for counts in a file, far above a real cycle: a period of 100 ms on eight buses at 1 Mbit/s.
+// Upper bound for the number of frames in a cycle, far above a real number: a period of 100 ms on eight buses at 1
+// Mbit/s.
 constexpr std::uint32_t most_frames_per_cycle = 16384;
 constexpr std::size_t most_entry_bytes = most_frames_per_cycle * 96 + 4096;
 constexpr std::size_t block_bytes = 1 << 18;
@@ -40,7 +41,7 @@ void archive(fieldbus::StateArchive& state, ReplayHead& head) noexcept {
         head.first_cycle);
 }
 
-// Returns false if the counts are out of range.
+// Reads or writes a frame. Returns false if the frame's bus or length is out of range.
 bool archive(fieldbus::StateArchive& state, BoxFrame& frame, std::uint32_t buses) noexcept {
   fieldbus::CanFrame& f = frame.frame;
   state(frame.time_ns, frame.bus, frame.sent, frame.result, f.id, f.extended, f.remote, f.error, f.fd,
@@ -299,7 +300,7 @@ class ReplayNetwork::Bus final : public fieldbus::CanBus {
   fieldbus::SendResult send(const fieldbus::CanFrame&) noexcept override {
     return next_ < results_.size() ? results_[next_++] : fieldbus::SendResult::sent;
   }
-  // Returns the next frame if it came on this bus, which keeps the order among buses.
+  // Returns the network's next frame if it came on this bus. This keeps the order of frames among the buses.
   bool receive(fieldbus::TimedFrame& out) noexcept override {
     if (network_.next_ >= network_.received_.size()) return false;
     const BoxFrame& frame = network_.received_[network_.next_];

@@ -1,10 +1,11 @@
 // The files for a replay, in the folder "replay" of a recorded session or a black box:
 //
-//   cycles.bin   the controller's state at one cycle; from there on, each cycle's input and the resulting setpoints.
-//                Entries, each after its length in bytes (u32): head, state, cycles; little-endian, without padding.
-//                Cycles are in blocks, each after its packed and unpacked length (both u32). Only the version of
-//                proxarm that wrote the file reads it
-//   files/       copies of the cell, scene, arm, sensor, meshes and register maps, at the same places relative to
+//   cycles.bin   the controller's state at one cycle and, from this cycle on, each cycle's input and the setpoints that
+//                resulted. The file is a sequence of entries: head, state, cycles. Each entry follows its length in
+//                bytes (u32). Entries are little-endian, without padding. The entries of cycles are grouped in blocks;
+//                each block follows its packed and its unpacked length (both u32). Only the version of proxarm that
+//                wrote the file can read it
+//   files/       copies of cell, scene, arm, sensor, meshes and register maps, which keep their places relative to
 //                each other
 #pragma once
 
@@ -26,32 +27,34 @@ inline constexpr const char* replay_folder = "replay";
 struct ReplayHead {
   SessionSettings settings;
   std::uint32_t axes = 0;
-  std::uint32_t buses = 0;                                  // of the network
-  std::array<std::uint8_t, max_buses> bus_of_cell_bus{};    // index in the network
-  std::array<std::array<char, 32>, max_buses> bus_names{};  // of the network's buses, ended by 0
-  std::array<char, 512> cell{}, scene{}, tool{};            // files, ended by 0; in a file relative to files/. Empty
-                                                            // tool: a point; the scene's own tool: the scene's file
+  std::uint32_t buses = 0;                                  // number of the network's buses
+  std::array<std::uint8_t, max_buses> bus_of_cell_bus{};    // index in the network of each of the cell's buses
+  std::array<std::array<char, 32>, max_buses> bus_names{};  // names of the network's buses, each ended by 0
+  // Paths of the files, ended by 0; in cycles.bin they are relative to files/. `tool` is empty for a point, and is the
+  // scene's path if the scene has the tool.
+  std::array<char, 512> cell{}, scene{}, tool{};
   std::uint64_t first_cycle = 0;
 };
 static_assert(std::is_trivially_copyable_v<ReplayHead>);
 
-// Copies these files into `folder`, at the same places relative to each other. Returns the common part of their paths,
-// which is left out there. Throws SetupError.
+// Copies these files into `folder`, and keeps their places relative to each other. Returns the common part of their
+// paths, which is left out in `folder`. Throws SetupError.
 std::filesystem::path copy_files(const std::vector<std::filesystem::path>& files, const std::filesystem::path& folder);
 
-// The position of an entry in cycles.bin: its block in the file, and its offset in the block.
+// The position of an entry in cycles.bin: the position of the entry's block in the file, and the entry's offset in the
+// block.
 struct ReplayPlace {
   std::int64_t block = 0;
   std::size_t at = 0;
 };
 
-// Writes cycles.bin; finish() reports a failed write. A session that dies loses at most its last block, 1/3 s on the
+// Writes cycles.bin. finish() reports a failed write. If the session dies, at most the last block is lost, 1/3 s on the
 // default cell.
 class ReplayWriter {
  public:
   ReplayWriter(const std::filesystem::path& file, ReplayHead head, std::vector<std::byte> state);
   void add(BoxCycle& cycle, std::vector<BoxFrame>& frames);
-  void finish();  // throws SetupError
+  void finish();  // throws SetupError if the file couldn't be written completely
 
  private:
   void put(const fieldbus::StateArchive& entry);
@@ -59,20 +62,21 @@ class ReplayWriter {
 
   std::filesystem::path name_;
   std::ofstream file_;
-  std::string block_;  // entries not written yet
+  std::string block_;  // entries that aren't written yet
   std::uint32_t axes_, buses_;
   std::vector<std::byte> entry_;
 };
 
-// Moves whole cycles from a black box to `folder`/replay: a session from its first cycle, or the rest of one. Not for
-// the cycle's thread.
+// Writes whole cycles of a black box to `folder`/replay: a session from its first cycle on, or the rest of a session.
+// Not for the cycle's thread.
 class ReplayRecorder {
  public:
   // Copies the files. Throws SetupError.
   ReplayRecorder(const BlackBox& box, const std::filesystem::path& folder,
                  const std::vector<std::filesystem::path>& files);
   void drain(const ReplayHead& head);
-  void finish();  // throws SetupError; if the writer fell behind by more than the box holds, the replay ends there
+  // Throws SetupError. If the recorder fell behind by more than the box holds, the replay ends where cycles were lost.
+  void finish();
 
  private:
   const BlackBox& box_;
@@ -82,9 +86,10 @@ class ReplayRecorder {
   bool lost_ = false;
 };
 
-// The path of a file of the record (ReplayHead::cell, scene); refuses paths that lead outside. Throws SetupError.
+// Returns the path of a recorded file (ReplayHead::cell, scene). Throws SetupError for a path that leads outside
+// `folder`.
 std::filesystem::path recorded_file(const std::filesystem::path& folder, const char* name);
-// The path of ReplayHead::tool; empty for a point.
+// Returns the path of ReplayHead::tool; empty for a point.
 std::filesystem::path recorded_tool(const std::filesystem::path& folder, const ReplayHead& head);
 
 // Reads cycles.bin. Throws SetupError for a file of another kind or of another version.
@@ -93,10 +98,10 @@ class ReplayReader {
   explicit ReplayReader(const std::filesystem::path& file);
   [[nodiscard]] const ReplayHead& head() const noexcept { return head_; }
   [[nodiscard]] const std::vector<std::byte>& state() const noexcept { return state_; }
-  // Returns false at the end. The record holds only the cycle's number and setpoints. An incomplete last entry, as
-  // after a crash, counts as the end.
+  // Reads the next cycle. Of the cycle's record, only number and setpoints are set. Returns false at the end. An
+  // incomplete last entry, as after a crash, counts as the end.
   bool next(BoxCycle& cycle, std::vector<BoxFrame>& frames);
-  // The position of the entry that next() reads; go_to() returns there.
+  // Returns the position of the entry that next() will read, for go_to().
   [[nodiscard]] ReplayPlace position() const noexcept;
   void go_to(const ReplayPlace& place);
   // Skips an entry. Returns false at the end.
@@ -110,15 +115,15 @@ class ReplayReader {
 
   std::filesystem::path name_;
   std::ifstream file_;
-  std::string block_;              // the present one
-  std::int64_t block_begins_ = 0;  // in the file
+  std::string block_;              // the present block, unpacked
+  std::int64_t block_begins_ = 0;  // position of the present block in the file
   std::int64_t block_ends_ = 0;
-  std::size_t at_ = 0;  // in the block, of the next entry
+  std::size_t at_ = 0;  // offset of the next entry in the block
   ReplayHead head_;
   std::vector<std::byte> state_, entry_;
 };
 
-// A network that gives each cycle its recorded frames, in order, and the recorded results of its sends.
+// A network that delivers each cycle's recorded frames, in order, and the recorded results of sending.
 class ReplayNetwork final : public fieldbus::CanNetwork {
  public:
   explicit ReplayNetwork(const ReplayHead& head);

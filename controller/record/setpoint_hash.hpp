@@ -1,7 +1,7 @@
-// SHA-256 of all setpoints, as int32 little-endian counts in axis order, cycle after cycle. Runs with the same
-// setpoints have the same hash.
+// SHA-256 of all setpoints, as int32 little-endian counts in axis order, cycle after cycle. Two sessions have the same
+// hash if their setpoints are equal.
 //
-// Not for the cycle; the reader of the records feeds it.
+// Not for the cycle: the reader of the records adds the setpoints.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class SetpointHash {
   SetpointHash();
 
   void add(std::span<const std::int32_t> counts);
-  // 64 lower-case hexadecimal digits, over all counts so far; more may be added.
+  // Returns the hash of all counts so far as 64 lower-case hexadecimal digits. More counts may be added afterwards.
   [[nodiscard]] std::string hex() const;
 
  private:

@@ -17,8 +17,8 @@ using Complex3 = std::array<Complex, 3>;
 constexpr double low_Hz = 0.3, high_Hz = 2.0, step_Hz = 0.05;
 constexpr double longest_segment_s = 10.0, shortest_segment_s = 0.5, least_travel_m = 1e-3;
 
-// Tukey's window, flat in the middle half with a cosine at either end. If a segment ends in motion, it keeps motion
-// outside the model (such as the arm's resonance) from leaking into the band.
+// Returns Tukey's window, which is flat in the middle half and has a cosine at either end. If a segment ends in motion,
+// the window keeps motion that isn't modelled (such as the arm's resonance) from leaking into the band.
 double tukey_window(std::size_t i, std::size_t count) {
   const double x = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
   const double edge = std::min(x, 1.0 - x) / 0.25;
@@ -34,7 +34,7 @@ double travel(const std::vector<Vec3>& positions) {
   return (high - low).norm();
 }
 
-// Re(x* y), the inner product of complex numbers seen as pairs of real ones.
+// Returns Re(x* y), the inner product of two complex numbers as pairs of real numbers.
 double inner(const Complex& x, const Complex& y) { return x.real() * y.real() + x.imag() * y.imag(); }
 
 }  // namespace
@@ -45,7 +45,7 @@ struct ApparentMass::Spectrum {
   Complex3 F;
   std::array<Complex3, 3> x;  // a, v, ȧ
 
-  // Central differences lose two samples at either end.
+  // Precondition: at least five samples, since central differences lose two samples at either end.
   static Spectrum at(double frequency_Hz, const std::vector<Vec3>& force, const std::vector<Vec3>& position, double T);
 };
 
@@ -73,7 +73,7 @@ ApparentMass::Spectrum ApparentMass::Spectrum::at(double frequency_Hz, const std
   return s;
 }
 
-// Removes a constant force from one axis: each signal's component along the window's transform.
+// Removes a constant force on one axis: subtracts from each signal its component along the window's transform.
 void ApparentMass::take_off_constant(std::vector<Spectrum>& band, std::size_t axis) {
   double ww = 0.0;
   for (const Spectrum& s : band) ww += std::norm(s.window);
@@ -123,7 +123,7 @@ void ApparentMass::add_to_normal_equations(const Spectrum& s, std::size_t axis) 
 std::optional<ApparentMass::Estimate> ApparentMass::estimate() const {
   const Eigen::Vector3d size = regressors_.diagonal().cwiseSqrt();
   if (!(size.minCoeff() > 0.0) || with_force_.isZero(0.0)) return std::nullopt;  // no motion, or no force
-  // Scaled to a unit diagonal. Below 1e-6, a and v can't be told apart, as in a single exponential.
+  // The matrix is scaled to a unit diagonal. Below 1e-6, a and v can't be told apart, as in a single exponential.
   const Eigen::Matrix3d scaled = size.cwiseInverse().asDiagonal() * regressors_ * size.cwiseInverse().asDiagonal();
   const Eigen::Vector3d force = with_force_.cwiseQuotient(size);
   const Eigen::Matrix2d two = scaled.topLeftCorner<2, 2>();
@@ -134,7 +134,7 @@ std::optional<ApparentMass::Estimate> ApparentMass::estimate() const {
   return estimate;
 }
 
-// ---- by frequency
+// ---- the felt mass by frequency
 
 namespace {
 
@@ -162,7 +162,8 @@ void FeltMassCurve::end_segment() {
   summed_ = 0;
 }
 
-// The acceleration belongs to the last sample, whose force was kept.
+// The second difference of three positions is the acceleration at the middle position, so it is added with the force of
+// the middle sample.
 void FeltMassCurve::add(const Vec3& force_N, const Vec3& position_m) {
   if (last_positions_.size() == 2) {
     const Vec3 a = (position_m - 2.0 * last_positions_[1] + last_positions_[0]) / (period_s_ * period_s_);
@@ -236,7 +237,7 @@ FeltMassCurve::Sums FeltMassCurve::all_axes(std::size_t band) const {
   return all;
 }
 
-// nullopt if the force isn't that of one mass.
+// Returns nullopt if the force isn't that of one mass.
 std::optional<FeltMassCurve::Point> FeltMassCurve::point(std::size_t band, const Sums& s) const {
   if (segments_ < least_segments || !(s.acceleration > 0.0)) return std::nullopt;
   if (!(std::norm(s.force_acceleration) >= least_coherence * s.force * s.acceleration)) return std::nullopt;
@@ -252,7 +253,7 @@ std::vector<FeltMassCurve::Point> FeltMassCurve::points() const {
 }
 
 std::vector<FeltMassCurve::Point> FeltMassCurve::points_along(std::size_t axis) const {
-  constexpr double least_share = 0.25;  // of the strongest axis's squared acceleration
+  constexpr double least_share = 0.25;  // share of the strongest axis's squared acceleration
   std::vector<Point> points;
   for (std::size_t band = 0; band < bands; ++band) {
     double strongest = 0.0;
@@ -270,7 +271,7 @@ double band_within_Hz(const std::vector<FeltMassCurve::Point>& curve, double mas
     const double error = std::abs(point.mass_kg - mass_kg) / mass_kg;
     if (error > limit) {
       if (within_Hz == 0.0) return 0.0;
-      // Interpolated linearly in logarithms.
+      // The frequency is interpolated linearly in logarithms.
       const double share = std::log(limit / error_there) / std::log(error / error_there);
       return within_Hz * std::pow(point.frequency_Hz / within_Hz, share);
     }

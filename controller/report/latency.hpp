@@ -1,9 +1,9 @@
-// Measures from the black box's entries how late and how long cycles are, in real time. Not for the cycle.
+// Measures from the black box's entries how late cycles are and how long they take, in real time. Not for the cycle.
 //
 //   wake_up             from t_k until SYNC is handed to the first interface with drives
-//   compute             the cycle without waiting
-//   sensor_to_setpoint  from the sensor's last frame on the wire until the last setpoint is handed to its interface;
-//                       only cycles with a sample of the sensor count
+//   compute             the duration of the cycle, without waiting
+//   sensor_to_setpoint  from the sensor's last frame on the wire until the last setpoint is handed to its interface.
+//                       Only cycles with a new sample of the sensor count
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 
 namespace proxarm::controller {
 
-// Bins of 1 µs up to 4096 µs, then of a sixteenth of an octave up to an hour.
+// Bins of 1 µs up to 4096 µs, then bins of a sixteenth of an octave up to an hour.
 class LatencyHistogram {
  public:
   static constexpr std::size_t fine = 4096, per_octave = 16, octaves = 20, bins = fine + per_octave * octaves;
@@ -32,7 +32,7 @@ class LatencyHistogram {
 
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] double max_us() const noexcept { return 1e-3 * static_cast<double>(max_ns_); }
-  // Returns this quantile, µs, rounded up to the end of its bin; in the last bin, the largest time.
+  // Returns the quantile of `share`, µs, rounded up to the end of its bin. In the last bin, returns the largest time.
   [[nodiscard]] double quantile_us(double share) const noexcept {
     std::uint64_t below = 0;
     for (std::size_t bin = 0; bin + 1 < bins; ++bin) {
@@ -44,7 +44,7 @@ class LatencyHistogram {
     return max_us();
   }
   [[nodiscard]] const std::array<std::uint64_t, bins>& counts() const noexcept { return counts_; }
-  // Lower edge of this bin, µs.
+  // Returns the lower edge of this bin, µs.
   [[nodiscard]] static constexpr std::uint64_t begin_us(std::size_t bin) noexcept {
     if (bin < fine) return bin;
     const std::size_t octave = (bin - fine) / per_octave, part = (bin - fine) % per_octave;
@@ -72,12 +72,12 @@ struct Latencies {
 
 class LatencyMeter {
  public:
-  // `sensor_ids`: identifiers of the sensor's frames, 29-bit ones with fieldbus::extended_id_flag. Precondition: `box`
-  // outlives this object.
+  // `sensor_ids`: identifiers of the sensor's frames; 29-bit identifiers have fieldbus::extended_id_flag. Precondition:
+  // `box` outlives this object.
   LatencyMeter(const BlackBox& box, std::size_t sensor_bus, std::vector<std::uint32_t> sensor_ids)
       : box_(box), sensor_bus_(sensor_bus), sensor_ids_(std::move(sensor_ids)) {}
 
-  // Takes all whole cycles since the last call, except those that the box has overwritten.
+  // Takes all whole cycles since the last call, except cycles that the box has overwritten.
   void drain();
   [[nodiscard]] const Latencies& latencies() const noexcept { return latencies_; }
 

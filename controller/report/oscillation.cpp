@@ -20,7 +20,7 @@ void OscillationWatch::end_spell() noexcept {
   present_ = {};
 }
 
-// ż = ẋ − ω_c z in each stage, by the bilinear transform.
+// Each stage is ż = ẋ − ω_c z, by the bilinear transform.
 void OscillationWatch::HighPass::step(double period_s, const models::Vec3& in, bool first) noexcept {
   const double half = 0.5 * corner_rad_per_s * period_s;
   const models::Vec3 before = z;

@@ -1,15 +1,17 @@
-// Finds the longest spell in which the arm swung by itself, with its frequency and amplitude, for the summary's
-// verdict.
+// Finds the longest spell in which the arm swung by itself, with frequency and amplitude, for the summary's verdict.
 //
-// PassivityObserver (controller/stability/passivity.hpp) reports in each cycle whether the tool oscillates and whether
-// that lasts. Oscillating cycles form one spell if pauses between them are shorter than `pause_s`, since a wall
-// interrupts it in every period. A blow is a spell of some 0.1 to 0.3 s, the ringing after it one of up to 1.4 s.
+// PassivityObserver (controller/stability/passivity.hpp) reports in each cycle whether the tool oscillates, and whether
+// the oscillation lasts. Oscillating cycles form one spell if the pauses between them are at most `pause_s`, since a
+// wall interrupts an oscillation in every period. A blow makes a spell of some 0.1 to 0.3 s; the gears' ringing after a
+// blow makes a spell of up to 1.4 s.
 //
-// Position and velocity of the spell pass through a high-pass H of n = 5 equal stages (fc = 4 Hz, which leaves 0.02 of
-// 2 Hz); ⟨z²⟩ and ⟨ż²⟩ are their mean squares. A sinusoid of amplitude A and frequency ω has
+// The tool's position passes through a high-pass H of n = 5 equal stages (fc = 4 Hz, which leaves 0.02 of a motion at 2
+// Hz). z is the filtered position, ż its rate of change; ⟨z²⟩ and ⟨ż²⟩ are their mean squares over the spell. A
+// sinusoid of amplitude A and frequency ω has
 //   ω² = ⟨ż²⟩/⟨z²⟩,   A = √(2⟨z²⟩)/|H(ω)|,   |H| = (1 + (2πfc/ω)²)^(−n/2).
-// For a tool that turns, ⟨z²⟩ and ⟨ż²⟩ combine position and rotation as in PassivityObserver: ⟨z² + ρ²ζ²⟩ with ρ² =
-// J/M. Each has its own amplitude at the common ω. Vectors in W. Not for the cycle.
+// For a tool that turns, ⟨z²⟩ and ⟨ż²⟩ combine position and rotation as in PassivityObserver: ⟨z² + ρ²ζ²⟩ with the
+// filtered rotation ζ and ρ² = J/M. Position and rotation have an amplitude each, at the common ω. Vectors are in W.
+// Not for the cycle.
 #pragma once
 
 #include <array>
@@ -21,11 +23,12 @@
 namespace proxarm::controller {
 
 struct Oscillation {
-  double from_s = 0.0;      // time of the record in which the spell began
+  double from_s = 0.0;      // when the spell began, in the record's time
   double duration_s = 0.0;  // 0: no oscillation
   double frequency_Hz = 0.0;
-  double amplitude_m = 0.0;             // of the tool's position
-  std::optional<double> amplitude_rad;  // of its rotation; absent: it doesn't turn
+  double amplitude_m = 0.0;  // amplitude of the tool's position
+  // Amplitude of the tool's rotation; absent: the tool doesn't turn.
+  std::optional<double> amplitude_rad;
   bool lasts = false;
 };
 
@@ -36,26 +39,27 @@ class OscillationWatch {
   struct Cycle {
     bool oscillates = false, lasts = false;
     models::Vec3 tool_W = models::Vec3::Zero();
-    // For a tool that turns: the sum of its rotations so far, rad, and ρ², m²/rad².
+    // For a tool that turns: turned_W is the sum of its rotations so far, rad; gyration_m2 is ρ², m²/rad².
     bool turns = false;
     models::Vec3 turned_W = models::Vec3::Zero();
     double gyration_m2 = 0.0;
   };
-  // Adds a cycle of rendering, which follows the last one; else call reset() before.
+  // Adds a cycle of rendering. Precondition: the cycle follows the last added one, or reset() was called in between.
   void add(double time_s, double period_s, const Cycle& cycle) noexcept;
-  // The next cycle doesn't follow the last one.
+  // Ends the present spell, because the next cycle doesn't follow the last one.
   void reset() noexcept;
 
-  // The present spell; and the longest of those that last, or of all if none lasts.
+  // The present spell.
   [[nodiscard]] Oscillation present() const noexcept;
+  // The longest of the spells that last, or of all spells if none lasts.
   [[nodiscard]] Oscillation longest() const noexcept;
 
  private:
   struct Spell {
     double from_s = 0.0, until_s = 0.0;
-    double z2 = 0.0, zdot2 = 0.0;          // sums of squares, position and rotation together,
-    double place2 = 0.0, rotation2 = 0.0;  // and separately,
-    double cycles = 0.0;                   // over this number of cycles
+    double z2 = 0.0, zdot2 = 0.0;          // sums of squares, position and rotation together
+    double place2 = 0.0, rotation2 = 0.0;  // sums of squares, position and rotation separately
+    double cycles = 0.0;                   // number of cycles in these sums
     bool turns = false, lasts = false;
     [[nodiscard]] double duration_s() const noexcept { return until_s - from_s; }
     [[nodiscard]] bool outdoes(const Spell& other) const noexcept;

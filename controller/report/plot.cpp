@@ -18,25 +18,25 @@ namespace fs = std::filesystem;
 using models::Vec3;
 
 constexpr std::size_t most_samples = 4000;
-constexpr double nothing_rad = 1e-6;  // a smaller turn has no reliable axis; it is known to 1e-9
+constexpr double nothing_rad = 1e-6;  // a smaller turn has no reliable axis; turns are known to 1e-9 rad
 
-// Of the picture, in pixels.
+// Sizes in the picture, in pixels.
 constexpr double head = 112.0, row_height = 236.0, between_rows = 21.0, foot = 108.0;
 
 }  // namespace
 
 double PlotBuilder::height_px() const noexcept { return head + row_height * rows() + foot; }
 
-// Draws the next panel in this row.
+// Places the next panel in this row.
 void PlotBuilder::place(std::ostream& gp, int row) const {
   const double top = head + row_height * row, bottom = top + row_height - between_rows;
   gp << "set tmargin at screen " << 1.0 - top / height_px() << "\nset bmargin at screen " << 1.0 - bottom / height_px()
      << "\n";
 }
 
-// Coordinates of the position panels: along `directions` from `origin`.
+// Coordinates of the position panels: `directions` from `origin`.
 struct PlotBuilder::Axes {
-  bool wall = false;  // directions[0] is the normal, directions[1] along the slide
+  bool wall = false;  // true: directions[0] is the normal, directions[1] is along the slide
   Vec3 origin = Vec3::Zero();
   std::array<Vec3, 3> directions{Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()};
   Vec3 turn = Vec3::UnitZ();  // axis of the shown rotations and torques
@@ -67,7 +67,7 @@ void PlotBuilder::add(const CycleRecord& record) {
   }
   if (seen_++ % stride_ != 0) return;
   if (samples_.size() >= most_samples) {
-    // Halves the resolution, also of the samples so far.
+    // Halves the resolution of the samples so far and of those to come.
     for (std::size_t i = 0; 2 * i < samples_.size(); ++i) samples_[i] = samples_[2 * i];
     samples_.resize((samples_.size() + 1) / 2);
     stride_ *= 2;
@@ -103,7 +103,7 @@ PlotBuilder::Axes PlotBuilder::axes() const {
     const Vec3 d = vec3(s->proxy) - vec3(first->proxy), along = d - n.dot(d) * n;
     if (s->contact != ContactPhase::free && along.norm() > farthest.norm()) farthest = along;
   }
-  // Nothing slid: any direction along the wall serves.
+  // Nothing slid, so any direction along the wall serves.
   if (!(farthest.norm() > 1e-6)) farthest = n.unitOrthogonal();
   axes.wall = true;
   axes.origin = vec3(first->proxy);
@@ -111,15 +111,16 @@ PlotBuilder::Axes PlotBuilder::axes() const {
   return axes;
 }
 
-// Rotation vectors in W since the first sample. Of equivalent vectors, the one nearest to the last is taken.
+// Returns the rotation vectors in W since the first sample. Of equivalent rotation vectors, takes the one nearest to
+// the last sample's.
 std::vector<Vec3> PlotBuilder::turns(std::array<double, 4> Sample::*orientation) const {
   std::vector<Vec3> turns;
   const models::Quaternion first = models::Quaternion((samples_.front().*orientation).data());
   Vec3 before = Vec3::Zero();
   for (const Sample& s : samples_) {
     Vec3 turn = models::rotation_vector(models::Quaternion((s.*orientation).data()) * first.conjugate());
-    const bool whole = turn.norm() < nothing_rad && before.norm() > 1.0;  // a revolution, whose axis is lost to
-                                                                          // rounding
+    // A whole revolution: its axis is lost to rounding, so the last sample's axis is taken.
+    const bool whole = turn.norm() < nothing_rad && before.norm() > 1.0;
     const Vec3 revolution = 2.0 * std::numbers::pi * (whole ? before : turn).stableNormalized();
     if (!turn.isZero(0.0) || whole)
       turn += std::round((before - turn).dot(revolution) / revolution.squaredNorm()) * revolution;
@@ -128,7 +129,8 @@ std::vector<Vec3> PlotBuilder::turns(std::array<double, 4> Sample::*orientation)
   return turns;
 }
 
-// The axis of the widest turn; without a turn, of the largest torque. Its largest coordinate is positive.
+// Returns the axis of the widest turn; if nothing turned, the axis of the largest torque. The axis's largest coordinate
+// is positive.
 Vec3 PlotBuilder::turning_axis(const std::vector<Vec3>& turns) const {
   const auto less = [](const Vec3& a, const Vec3& b) { return a.squaredNorm() < b.squaredNorm(); };
   Vec3 most = *std::max_element(turns.begin(), turns.end(), less);
@@ -141,7 +143,7 @@ Vec3 PlotBuilder::turning_axis(const std::vector<Vec3>& turns) const {
   return most[largest] < 0.0 ? Vec3(-most.normalized()) : Vec3(most.normalized());
 }
 
-// Contact phases as intervals; one too short to be seen is merged with the one before it.
+// Returns the contact phases as intervals. An interval too short to be seen is merged with the interval before it.
 std::vector<PlotBuilder::Band> PlotBuilder::bands() const {
   std::vector<Band> bands;
   const double shortest = (samples_.back().time_s - samples_.front().time_s) / 400.0;
@@ -165,8 +167,8 @@ std::vector<PlotBuilder::Band> PlotBuilder::bands() const {
   return bands;
 }
 
-// Columns: time, tool ×3, proxy ×3 (mm), push of the hand, contact force, friction (N), rotation of tool and proxy (°),
-// torque of hand and contact (Nm).
+// Returns the lines of the data file. Columns: time; tool ×3 and proxy ×3 (mm); push of the hand, contact force,
+// friction (N); rotation of tool, rotation of proxy (°); torque of hand, torque of contact (Nm).
 std::string PlotBuilder::data(const Axes& axes) const {
   const std::vector<Vec3> tool_turns = turns(&Sample::tool_q), proxy_turns = turns(&Sample::proxy_q);
   constexpr double degrees = 180.0 / std::numbers::pi;
@@ -195,8 +197,8 @@ std::string PlotBuilder::data(const Axes& axes) const {
   return text;
 }
 
-// The range of a panel without single peaks: the impulse of an impact is M v/T, hundreds of newtons in one step.
-// `least`: the smallest margin.
+// Returns the range of a panel without single peaks: the impulse of an impact is M v/T, hundreds of newtons in one
+// step. The margin beside the values is a tenth of their range, and of at least `least`.
 PlotBuilder::Range PlotBuilder::without_peaks(std::vector<double> values, double least) {
   std::sort(values.begin(), values.end());
   const auto rank = [&values](double part) {
@@ -207,7 +209,7 @@ PlotBuilder::Range PlotBuilder::without_peaks(std::vector<double> values, double
   return {low - margin, high + margin};
 }
 
-// The near panel shows the tool's depth in the wall.
+// The range of the panel "near" shows the tool's depth in the wall.
 PlotBuilder::Ranges PlotBuilder::ranges(const Axes& axes) const {
   const Vec3 n = axes.directions[0];
   std::vector<double> forces, torques;
@@ -236,14 +238,14 @@ std::string PlotBuilder::script(const Axes& axes, const std::string& answer) con
      << " lw 1.8\nset style line 3 " << gnuplot_line("contact") << " lw 2.4\nset style line 4 "
      << gnuplot_line("friction") << " lw 2.8\nset style line 5 " << gnuplot_line("hand")
      << " lw 3.2\n"
-     // For a hand alone: y and z.
+     // Styles 6 and 7 are for y and z of the hand's force, without a wall.
      << "set style line 6 lc rgb '" << hand << "' lw 2.4 dt (10,5)\nset style line 7 lc rgb '" << hand
      << "' lw 2.8 dt (2,4)\n"
      << "set xrange [" << from << ":" << to << "]\nset grid lc rgb '#b0b0b0' lw 0.6\n"
      << "set lmargin 11\nset rmargin 3\nset format x ''\n";
   const double top = 1.0 - 23.0 / height_px();
   const std::string labels = shade_contacts(gp, 0.04 * (to - from));
-  const double second = 1.0 - 56.0 / height_px();  // line
+  const double second = 1.0 - 56.0 / height_px();  // height of the second line
   gp << "set multiplot\nset label 100000 " << gnuplot_string(answer.empty() ? title_ : answer)
      << " at screen 0.02, screen " << top << " left font 'sans,23'\nset label 100001 "
      << gnuplot_string(answer.empty() ? "" : title_) << " at screen 0.02, screen " << second
@@ -257,7 +259,7 @@ std::string PlotBuilder::script(const Axes& axes, const std::string& answer) con
   return gp.str();
 }
 
-// Returns the labels of phases that are long enough for one.
+// Returns the labels of the phases that are long enough for a label.
 std::string PlotBuilder::shade_contacts(std::ostream& gp, double shortest_labelled_s) const {
   int object = 0;
   std::ostringstream labels;
@@ -296,7 +298,7 @@ void PlotBuilder::draw_positions(std::ostream& gp, bool wall, const Ranges& rang
   }
 }
 
-// Draws the rotation of the proxy, and of the tool if simulated.
+// Draws the rotation of the proxy, and of the tool if the tool is simulated.
 void PlotBuilder::draw_turn(std::ostream& gp, const Vec3& axis, const Range& torque_Nm) const {
   char about[80];
   const auto hundredths = [](double x) { return 0.01 * std::round(100.0 * x) + 0.0; };  // also turns −0 into 0
@@ -326,7 +328,7 @@ void PlotBuilder::draw_forces(std::ostream& gp, bool wall, const Ranges& range) 
      << names[2] << "'\nunset multiplot\n";
 }
 
-// Labels the largest force if it leaves the panel: an impact's is M v/T in a single cycle.
+// Labels the largest contact force if it leaves the panel: the force of an impact is M v/T in a single cycle.
 void PlotBuilder::label_peak(std::ostream& gp, const Axes& axes, const Range& range) const {
   const double peak_N = axes.directions[0].dot(vec3(peak_.contact_force));
   if (!axes.wall || !(peak_N > range.high)) return;

@@ -1,12 +1,13 @@
-// Draws a session as a picture (SVG, by gnuplot): positions of tool and proxy, forces, contact phases as bands.
+// Draws a session as a picture (SVG, by gnuplot): positions of tool and proxy, forces, and contact phases as bands.
 //
-// With a contact, positions are along the first contact's normal and the direction in which the proxy slid farthest;
-// the surface is at 0. Without one, the panels show x, y and z. For a tool that turns, two more panels show rotations
-// since the start and torques about the rendered point, along the axis of the proxy's widest turn. Only
-// Phase::rendering is drawn. Long sessions are thinned out to some thousand points, so memory is bounded. Curves differ
-// in dash and width as well as in colour, sticking and slipping in shade and label.
+// If there is a contact, positions are drawn along the first contact's normal, and along the direction in which the
+// proxy slid farthest; the surface is at 0. If there is no contact, the panels show x, y and z. For a tool that turns,
+// two more panels show rotations since the start, and torques about the rendered point, along the axis of the proxy's
+// widest turn. Only Phase::rendering is drawn. Long sessions are thinned out to some thousand points, so memory is
+// bounded. Curves differ in dash and width as well as in colour; sticking and slipping differ in shade and label.
 //
-// Without gnuplot there is a warning instead of a picture. gnuplot is started without a shell, in a temporary folder,
+// If gnuplot is missing, there is a warning instead of a picture. gnuplot is started without a shell, in a temporary
+// folder, and its script quotes all paths and names that come from outside. Not for the cycle.
 // and its script quotes all paths and names from outside. Not for the cycle.
 #pragma once
 
@@ -24,15 +25,15 @@ namespace proxarm::controller {
 
 class PlotBuilder {
  public:
-  // `title`: one line of plain text above the picture. `gnuplot` is looked up in PATH.
+  // `title`: one line of plain text above the picture. `gnuplot`: the program, looked up in PATH.
   explicit PlotBuilder(std::string title, std::string gnuplot = "gnuplot");
 
   void add(const CycleRecord& record);
 
-  // Whether nothing was rendered.
+  // Returns whether there is nothing to draw, because nothing was rendered.
   [[nodiscard]] bool is_empty() const noexcept { return samples_.size() < 2; }
-  // Writes the SVG. Returns a warning of one line on failure, else an empty string. `answer`: the first line of the
-  // picture, plot_headline() of a summary.
+  // Writes the SVG. Returns a warning of one line on failure, else an empty string. `answer` becomes the first line of
+  // the picture; it is plot_headline() of a summary.
   [[nodiscard]] std::string write(const std::filesystem::path& svg, const std::string& answer = "") const;
 
  private:

@@ -26,7 +26,7 @@ void Progress::update(double done_s, std::string_view note) {
   if (drawn_ && now - last_ < std::chrono::milliseconds(100)) return;
   last_ = now;
   drawn_ = true;
-  // The last column stays free: some terminals wrap when it is written.
+  // The last column stays free, since some terminals wrap when the last column is written.
   const std::string line = "\r" + progress_line(done_s, total_s_, note, columns_of(stream_) - 1, unit_) + "\x1b[K";
   std::fwrite(line.data(), 1, line.size(), stream_);
   std::fflush(stream_);

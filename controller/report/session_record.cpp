@@ -21,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t buffer_bytes = 1 << 16;
-constexpr std::size_t packed_at_once = 1 << 18;  // bytes of text: 1/3 s of frames; packing shrinks it to a ninth
-// All files that a session's folder may hold and a later session replaces.
+constexpr std::size_t packed_at_once = 1 << 18;  // bytes of text, 1/3 s of frames; packing shrinks them to a ninth
+// All files that a session's folder may hold, and that a later session replaces.
 constexpr const char* file_names[] = {"signals.csv",    "signals.bin",    "columns.json",
                                       "frames.log",     "frames.log.zst", "session.mcap",
                                       "contacts.csv",   "contacts.bin",   "contact_columns.json",
@@ -40,7 +40,8 @@ bool is_folder(const fs::path& path) {
   return fs::symlink_status(path, error).type() == fs::file_type::directory;
 }
 
-// Whether this folder is the Python package's cache of signals.csv (controller/python/proxarm): a file per column.
+// Returns whether this folder is the Python package's cache of signals.csv (controller/python/proxarm), with a file per
+// column.
 bool is_kept_columns(const fs::path& path) {
   std::error_code error;
   return is_folder(path) && std::all_of(fs::directory_iterator(path, error), {}, [](const fs::directory_entry& entry) {
@@ -48,7 +49,8 @@ bool is_kept_columns(const fs::path& path) {
          });
 }
 
-// Whether this is a session's replay, its black box or its columns: a folder with nothing else in it, and no link.
+// Returns whether this folder is a session's replay, its black box or its cached columns. The folder may contain
+// nothing else and may not be a link.
 bool is_our_folder(const fs::path& path) {
   std::error_code error;
   if (!is_folder(path)) return false;
@@ -63,7 +65,7 @@ bool is_our_folder(const fs::path& path) {
 
 }  // namespace
 
-// On a file system without locks, everybody gets the lock.
+// On a file system without locks, take() always succeeds.
 bool SessionWriter::Lock::take(const fs::path& folder) noexcept {
   descriptor_ = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   return descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;

@@ -1,21 +1,22 @@
 // Writes a recorded session: a folder with its input, its output and its configuration.
 //
-//   signals.csv      a row per cycle (signals/signal_columns.hpp). The first row names columns with units and frames;
-//                    numbers are the shortest text that reads back to the same double
-//   signals.bin      the same in binary, instead of signals.csv (signals/signal_table.hpp)
-//   columns.json     unit, frame and meaning of each column
-//   contacts.csv     a row for each contact of each cycle (signals/contact_columns.hpp), or contacts.bin instead;
-//                    contact_columns.json has the columns' meanings
-//   session.mcap     the same session for other tools (messages/mcap_writer.hpp)
-//   frames.log       every frame on every bus, in the format of `candump -L`, for canplayer and log2asc; packed:
-//                    frames.log.zst
-//   effective.yaml   the session's configuration with all defaults (other configuration files under their names)
-//   summary.json     the repeatable figures (repeatable_json())
-//   replay           what `proxarm replay` needs (replay_log.hpp)
-//   timing.json      the wall clock's figures (timing_json()); only here are overruns and compute time
+//   signals.csv           a row per cycle (signals/signal_columns.hpp). The first row names the columns with units and
+//                         frames. A number is the shortest text that reads back to the same double
+//   signals.bin           the same rows in binary, instead of signals.csv (signals/signal_table.hpp)
+//   columns.json          unit, frame and meaning of each column of signals.csv or signals.bin
+//   contacts.csv          a row for each contact of each cycle (signals/contact_columns.hpp)
+//   contacts.bin          the same rows in binary, instead of contacts.csv
+//   contact_columns.json  unit, frame and meaning of each column of contacts.csv or contacts.bin
+//   session.mcap          the same session for other tools (view/messages/mcap_writer.hpp)
+//   frames.log            every frame on every bus, in the format of `candump -L`, for canplayer and log2asc
+//   frames.log.zst        the same frames packed, instead of frames.log
+//   effective.yaml        the session's configuration with all defaults; other configuration files have their own names
+//   summary.json          the repeatable figures (repeatable_json())
+//   replay                folder for `proxarm replay` (replay_log.hpp)
+//   timing.json           the wall clock's figures (timing_json()); overruns and compute time are only here
 //
-// Two runs with the same input give the same bytes in all files but timing.json. Not for the cycle: the cycle leaves
-// records in a ring, and its reader calls this class.
+// Two runs with the same input give the same bytes in all files except timing.json. Not for the cycle: the cycle leaves
+// its records in a ring, and the reader of the ring calls this class.
 #pragma once
 
 #include <cstdint>
@@ -37,22 +38,22 @@ namespace proxarm::controller {
 
 class SessionWriter {
  public:
-  // Makes the folder, with parents, or replaces an earlier session in it. Throws description::SetupError with key
-  // --record if the folder holds anything else, can't be written, or another session writes to it. The folder is locked
-  // (flock) while the writer or a process forked meanwhile lives. `axis_names`: for the drives' columns, at most
-  // max_axes. `with_truth`: adds the columns of the simulation's true state.
+  // Makes the folder, with its parents, or replaces an earlier session in it. Throws description::SetupError with the
+  // key --record if the folder holds anything else, if it can't be written, or if another session writes to it. The
+  // folder is locked (flock) as long as the writer lives, or a process that was forked from the writer's. `axis_names`:
+  // for the drives' columns, at most max_axes. `with_truth`: adds the columns of the simulation's true state.
   SessionWriter(const std::filesystem::path& folder, const std::vector<std::string>& axis_names, bool with_truth,
                 SignalsForm form = SignalsForm::csv);
 
   void add(const CycleRecord& record, const DerivedSignals& derived = {});
-  // `time_ns`: of the frame's last bit, ≥ 0, on the network's clock. The records' time differs: bring-up precedes the
-  // first cycle.
+  // `time_ns`: time of the frame's last bit, ≥ 0, on the network's clock. This isn't the records' time, which begins
+  // with the first cycle, after bring-up.
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
-  // Writes a configuration file's text: effective.yaml, or cell, scene, hand, sensor.yaml and arm.urdf as they were
-  // read; reason.txt says why there is a black box.
+  // Writes a text as a file of the record. The names are effective.yaml; cell.yaml, scene.yaml, hand.yaml, sensor.yaml
+  // and arm.urdf for these files as they were read; reason.txt for the reason of a black box.
   void write_file(std::string_view name, std::string_view text);
-  // Writes summary.json and timing.json; closes all files. Throws description::SetupError if a file couldn't be written
-  // completely, for example on a full disk.
+  // Writes summary.json and timing.json, and closes all files. Throws description::SetupError if a file couldn't be
+  // written completely, for example on a full disk.
   void finish(const Summary& summary);
 
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
@@ -60,7 +61,7 @@ class SessionWriter {
  private:
   class Lock {
    public:
-    // Doesn't block. Returns whether the lock is held.
+    // Tries to lock the folder, without blocking. Returns whether the lock is held.
     bool take(const std::filesystem::path& folder) noexcept;
     Lock() = default;
     Lock(const Lock&) = delete;

@@ -18,7 +18,8 @@ using models::Vec3;
 constexpr double shortest_slide_s = 0.1;
 constexpr double free_force_N = 1e-3;  // far above rounding (κ times an ulp of q), far below what a hand feels
 
-// Durations in bins of 10 ns up to 1 ms, then of 1 % up to 10 s, so that a median over hours needs little memory.
+// Counts durations in bins of 10 ns up to 1 ms, then in bins of 1 % up to 10 s, so that a median over hours needs
+// little memory.
 class Durations {
  public:
   void add(std::int64_t ns) {
@@ -28,7 +29,7 @@ class Durations {
     total_ns_ += ns;
   }
 
-  // The quantile, µs, at most the longest duration.
+  // Returns the quantile of `fraction`, µs, at most the longest duration.
   [[nodiscard]] double quantile_us(double fraction) const {
     if (count_ == 0) return 0.0;
     const auto rank = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));
@@ -59,7 +60,7 @@ class Durations {
   std::int64_t max_ns_ = 0, total_ns_ = 0;
 };
 
-// Root mean square and maximum of a stream.
+// Root mean square and maximum of a stream of values.
 struct Spread {
   double sum_of_squares = 0.0, max = 0.0;
   std::uint64_t count = 0;
@@ -80,8 +81,8 @@ struct Slide {
   double tangential = 0.0, limit = 0.0, length_s = 0.0;
 };
 
-// Parameter names: "limits.leash_m"; for a joint's own limit one for each of `axes`, such as "axis_2:
-// max_speed_rad_per_s".
+// Returns the names of the limit's parameters. A common limit has one name ("limits.leash_m"). A joint's own limit has
+// a name for each joint in `joints` ("axis_2: max_speed_rad_per_s"); `names` are the joints' names.
 std::vector<std::string> parameter_names(Limit limit, const ActiveLimits::Joints& joints,
                                          const std::vector<std::string>& names) {
   const std::string parameter = limit_parameter(limit);
@@ -135,27 +136,27 @@ struct SummaryBuilder::State {
   void slide(const CycleRecord& now, const Vec3& resistance);
 
   SummaryConfig config;
-  double limits_push_J = 0.0;  // energy put in by limits and not taken back
+  double limits_push_J = 0.0;  // energy that limits have put in and not taken back
   Summary summary;
   SetpointHash hash;
   Durations durations;
   Spread tracking, lagging, contact_force;
   ApparentMass apparent;
   FeltMassCurve felt;
-  ApparentMass apparent_turning;         // the same with angles and torques
-  std::optional<Eigen::Quaterniond> R0;  // at the start of rendering
-  double inertia_kg_m2 = 0.0;            // of the proxy, in the last record
+  ApparentMass apparent_turning;         // apparent inertia, from angles and torques
+  std::optional<Eigen::Quaterniond> R0;  // orientation at the start of rendering
+  double inertia_kg_m2 = 0.0;            // the proxy's inertia in the last record
   OscillationWatch oscillation;
-  std::optional<Eigen::Quaterniond> R_k1;  // of the true tool if it turns, in the last record,
-  Vec3 turned_W = Vec3::Zero();            // and the sum of its rotations
+  std::optional<Eigen::Quaterniond> R_k1;  // orientation of the true tool in the last record, if the tool turns
+  Vec3 turned_W = Vec3::Zero();            // sum of the true tool's rotations
   Slide sliding;
   double contact_s = 0.0;  // duration of the present contact
-  // In whole periods, so that sums don't round.
+  // Times in whole periods, so that sums don't round.
   std::int64_t period_ns, all_ns = 0, rendered_ns = 0, touching_ns = 0, slipping_ns = 0;
-  bool changing = false;  // the timestep
+  bool changing = false;  // whether the timestep is changing
   std::int64_t asked_ns = 0;
-  double mass_kg = 0.0;            // of the proxy, in the last record
-  std::optional<Vec3> start;       // x₀ of the spring
+  double mass_kg = 0.0;            // the proxy's mass in the last record
+  std::optional<Vec3> start;       // x₀ of the virtual spring
   std::deque<CycleRecord> recent;  // consecutive cycles of rendering, newest last
 };
 
@@ -194,7 +195,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
   if (n > kept) s.recent.pop_front();
 }
 
-// Figures over all phases.
+// Adds to the figures over all phases.
 void SummaryBuilder::State::count(const CycleRecord& record) {
   ++summary.cycles;
   all_ns += period_ns;
@@ -227,7 +228,8 @@ void SummaryBuilder::State::count_limit(const std::string& parameter, RecordFlag
   limit.time_s += seconds(period_ns);
 }
 
-// A mass, damping or spring that is set during rendering counts from then on; the wanted mass is the last one.
+// Follows a mass, damping or spring that is set during rendering: it counts from then on, and the last mass is the
+// wanted one.
 void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
   if (record.tool_mass_kg > 0.0 && config.handle_mass_kg > 0.0) config.handle_mass_kg = record.tool_mass_kg;
   if (record.proxy_mass_kg != mass_kg) {
@@ -246,8 +248,8 @@ void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
   inertia_kg_m2 = record.proxy_inertia_kg_m2;
 }
 
-// Nothing is rendered while the timestep changes; figures then go on with the new one. The apparent mass is that of the
-// last timestep.
+// Follows changes of the timestep. Nothing is rendered while the timestep changes; figures then go on with the new
+// timestep. The apparent mass is measured anew after each change.
 void SummaryBuilder::State::follow_timestep(const CycleRecord& record) {
   const bool was_changing = changing;
   changing = record.has(RecordFlag::timestep);
@@ -290,8 +292,8 @@ void SummaryBuilder::State::observe(const CycleRecord& record) {
   p.felt_damping_min_Ns_per_m = std::min(p.felt_damping_min_Ns_per_m, record.felt_damping_Ns_per_m);
 }
 
-// From the simulation's true state, if recorded. Otherwise from the controller's estimate of the links for a tool that
-// turns, else from the encoders.
+// Returns the tool's motion for the oscillation watch. It comes from the simulation's true state, if recorded.
+// Otherwise it comes from the controller's estimate of the links if the tool turns, else from the encoders.
 OscillationWatch::Cycle SummaryBuilder::State::swing(const CycleRecord& record) {
   const bool truth = record.has(RecordFlag::truth);
   OscillationWatch::Cycle cycle{.oscillates = record.has(RecordFlag::oscillation),
@@ -322,7 +324,7 @@ void SummaryBuilder::State::penetrate(const CycleRecord& record) {
     touching_ns += period_ns;
     if (record.contact == ContactPhase::slip) slipping_ns += period_ns;
     const double pull = -vec3(record.contacts[0].normal_W).dot(vec3(record.contact_force_W_N));
-    // With several contacts only the sum of their forces is known.
+    // With several contacts, only the sum of their forces is known.
     if (record.contact_count <= 1) summary.pulling_force_max_N = std::max(summary.pulling_force_max_N, pull);
   }
   summary.penetration_max_m = std::max(summary.penetration_max_m, -record.proxy_clearance_m);
@@ -348,7 +350,7 @@ void SummaryBuilder::State::track(const CycleRecord& record) {
   tracking.add((vec3(tool) - vec3(due.proxy_W_m)).norm());
 }
 
-// Figures that need derivatives: central differences at the record before the last.
+// Adds to the figures that need derivatives: central differences at `now`, the record before the last.
 void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after) {
   const double T = config.period_s, m = config.handle_mass_kg, M = config.wanted_mass_kg, B = config.damping_Ns_per_m;
   const bool truth = before.has(RecordFlag::truth) && now.has(RecordFlag::truth) && after.has(RecordFlag::truth);
@@ -359,8 +361,8 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
 
   const Vec3 spring = config.spring_N_per_m * (x - *start);
   if (now.contact == ContactPhase::free) {
-    // A world may act without contacts: a field of friction, a soft layer. If a limit acts, the motion isn't that of
-    // the mass.
+    // The world may act without a contact: by a field of friction or a soft layer. If a limit acts, the motion isn't
+    // that of the mass.
     if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now) && !now.has(RecordFlag::ramp_in) &&
         !now.has(RecordFlag::hands_off)) {
       felt.add(hand - spring, x);
@@ -372,10 +374,10 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   felt.end_segment();
   apparent_turning.end_segment();
   if (now.contact == ContactPhase::free) return;
-  // `contact_s` belongs to `after`: one period more than at `now`, unless the contact ends there.
+  // `contact_s` belongs to `after`: it is one period more than at `now`, unless the contact ends at `after`.
   const bool established = after.contact != ContactPhase::free && contact_s - T > config.touch_s;
   if (!established) return;
-  // (24): M_p ∇²q(k)/T² + B ∇q(k)/T = h(k) + f(k), with the differences that end at q(k).
+  // (24): M_p ∇²q(k)/T² + B ∇q(k)/T = h(k) + f(k). The differences ∇ end at q(k).
   const std::size_t i = recent.size() - 2;
   const Vec3 q = vec3(now.proxy_W_m), q1 = vec3(before.proxy_W_m);
   const Vec3 q2 = i >= 2 ? vec3(recent[i - 2].proxy_W_m) : q1;

@@ -117,7 +117,7 @@ Json view(const std::optional<ViewSummary>& summary) {
           {"may_change", summary->may_change}};
 }
 
-// By frequency: real part and phase of F/a, and |F/a − M|/M.
+// Returns by frequency: real part and phase of F/a, and |F/a − M|/M.
 Json felt_mass(const Summary& s) {
   Json list = Json::array();
   if (!(s.wanted_mass_kg > 0.0)) return list;

@@ -18,7 +18,7 @@ std::string format(const char* pattern, double value) {
   return text;
 }
 
-// A length with a readable unit: "12.3 µm", "0.45 mm", "0 m".
+// Returns a length with a readable unit: "12.3 µm", "0.45 mm", "0".
 std::string length(const std::optional<double>& metres) {
   if (!metres) return "none";
   const double size = std::abs(*metres);
@@ -53,7 +53,7 @@ constexpr const char* sgr_of(VerdictTone tone) {  // ECMA-48, select graphic ren
   return tone == VerdictTone::good ? "\x1b[32m" : tone == VerdictTone::look ? "\x1b[33m" : "\x1b[1;31m";
 }
 
-// The summary's lines, with the names in a column on the left.
+// The lines of the summary, with the names in a column on the left.
 class Lines {
  public:
   explicit Lines(bool colour) : colour_(colour) {}
@@ -101,7 +101,8 @@ void tell_time(const Summary& s, Lines& line) {
   if (!loads.empty()) line("bus load", loads);
 }
 
-// For each axis along which the tool moved, the frequency up to which the mass is right; the worst axis first.
+// Returns, for each axis along which the tool moved, the frequency up to which the felt mass is right. The worst axis
+// comes first.
 std::string felt_along(const Summary& s) {
   const auto& [name, limit] = felt_limits[1];  // 10 %
   std::vector<std::pair<double, const char*>> along;
@@ -125,7 +126,7 @@ std::string felt_band(const Summary& s) {
   return "within " + std::string(name) + (band_Hz > 0.0 ? format(" up to %.2g Hz", band_Hz) : " nowhere");
 }
 
-// The frequency up to which the mass is right, and the mass where it is worst.
+// Writes the frequency up to which the felt mass is right, and the felt mass at the highest frequency.
 void tell_felt_mass(const Summary& s, Lines& line) {
   if (s.felt_mass.empty() || !(s.wanted_mass_kg > 0.0)) return;
   std::string bands;
@@ -141,7 +142,7 @@ void tell_felt_mass(const Summary& s, Lines& line) {
                format("phase %.0f degrees", 180.0 / std::numbers::pi * std::arg(last.mass_kg)));
 }
 
-// A smaller force of the world is rounding.
+// A world's force below this is rounding.
 constexpr double noticeable_N = 1e-3;
 
 std::string apparent_mass(const Summary& s) {
@@ -149,7 +150,8 @@ std::string apparent_mass(const Summary& s) {
          (s.wanted_mass_kg > 0.0 ? format(", wanted %.3f kg", s.wanted_mass_kg) : ", the device's own");
 }
 
-// A negative value isn't damping: the delay between push and motion adds a little energy in each swing.
+// Returns the text on the damping. A negative value isn't damping: the delay between push and motion adds a little
+// energy in each swing.
 std::string drag(const std::optional<double>& damping, const char* unit, const char* pattern) {
   if (!damping) return "";
   if (*damping >= 0.0) return "; damping " + format(pattern, *damping) + unit;
@@ -228,7 +230,8 @@ std::string poses_text(const UnstablePlaces& there) {
 
 namespace {
 
-// Weber fraction of a mass moved by hand: smaller differences are hardly noticed (docs/view.md cites the sources).
+// Weber fraction of a mass moved by hand: hands notice smaller differences only rarely (docs/view.md cites the
+// sources).
 constexpr double noticeable_mass_share = 0.1;
 
 std::string hands_off(const Summary& s) {
@@ -245,7 +248,7 @@ void tell_oscillation(const Summary& s, Lines& line) {
   line("", "a longer setpoint filter; `proxarm tune` says which mass, and `damping added` what --passivity did");
 }
 
-// Longest first, each with its time.
+// Returns the limits that acted, each with its time, the longest time first.
 std::string limits_in_brief(const Summary& s) {
   if (s.active_limits.empty()) return "none";
   std::vector<std::pair<double, const std::string*>> longest;
@@ -259,7 +262,7 @@ std::string limits_in_brief(const Summary& s) {
   return longest.size() <= most ? text : text + " and " + std::to_string(longest.size() - most) + " more";
 }
 
-// Limits that acted, and the energy that they exchanged.
+// Writes the limits that acted, and the energies.
 void tell_limits(const Summary& s, Lines& line) {
   if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
   for (const auto& [parameter, limit] : s.active_limits) {
@@ -310,7 +313,7 @@ void tell_faults(const Summary& s, Lines& line) {
   }
 }
 
-// Remarks on a session without a fault, most important first.
+// Returns remarks on a session without a fault, the most important remark first.
 std::string remarks(const Summary& s) {
   std::string text;
   const auto add = [&text](bool is_so, const std::string& words) {
@@ -330,7 +333,7 @@ std::string remarks(const Summary& s) {
   return text;
 }
 
-// The brief summary. Rotation and problems have lines of their own.
+// Writes the brief summary. Rotation and problems have lines of their own.
 void tell_in_brief(const Summary& s, Lines& line) {
   line("ended", s.end.text.empty() ? format("%.3f s were rendered", s.rendered_time_s) : s.end.text);
   line("apparent mass",
@@ -356,7 +359,8 @@ void tell_in_brief(const Summary& s, Lines& line) {
   tell_faults(s, line);
 }
 
-// The place where the felt mass was nearest to the smallest stable mass, if that was searched.
+// Writes the place where the felt mass was nearest to the smallest stable mass, if the smallest stable mass was
+// searched.
 void tell_margin(const Summary& s, Lines& line) {
   const auto share = [](const PassedPoses::Place& place) {
     return place.smallest_stable_mass_kg ? place.felt_mass_kg / *place.smallest_stable_mass_kg : 0.0;

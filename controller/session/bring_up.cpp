@@ -23,7 +23,7 @@ using description::SetupError;
 
 constexpr std::int64_t rate_measurement_ns = 250'000'000;
 
-// cell.buses.size() for a Modbus line.
+// Returns the bus's index in the cell; cell.buses.size() for a Modbus line.
 std::size_t index_of(const description::Cell& cell, const std::string& bus) {
   const auto found = std::find_if(cell.buses.begin(), cell.buses.end(),
                                   [&](const description::BusDescription& b) { return b.name == bus; });
@@ -34,8 +34,8 @@ fieldbus::DriveSettings drive_settings(const description::Cell& cell, const Sess
   fieldbus::DriveSettings drive;
   drive.period_ns = std::llround(settings.period_s * 1e9);
   drive.stop_without_controller(cell.supervision.bus_loss_stop_s);
-  drive.heartbeat_in_operation = false;  // its frame could delay a bus's last setpoint beyond the deadline:
-                                         // docs/design.md
+  // The drive's heartbeat frame could delay a bus's last setpoint beyond the deadline: docs/design.md.
+  drive.heartbeat_in_operation = false;
   return drive;
 }
 
@@ -52,16 +52,16 @@ std::vector<DriveBus> drive_buses(const std::vector<fieldbus::DriveSlot>& drives
   return buses;
 }
 
-// All drives in the order of the joints; `can` and `modbus` point into `all`.
+// All drives in the order of the joints. `can` and `modbus` point to drives in `all`.
 struct Drives {
   std::vector<DriveOnBus> all;
   std::vector<fieldbus::DriveSlot> can;
   std::vector<fieldbus::ModbusDrive*> modbus;
 };
 
-// 6065h and 6066h: the drive judges its following error a little later than the controller does (drive_monitor.hpp).
-// Window: the lag at the highest speed plus the deviation that is a fault at once. Time: what the setpoint of a joint
-// that jams at that speed takes to brake and return.
+// Sets 6065h and 6066h, by which the drive judges its following error a little later than the controller does
+// (drive_monitor.hpp). 6065h, the window, is the lag at the highest speed plus the deviation that is a fault at once.
+// 6066h, the time, is what the setpoint needs to brake and return if a joint jams at the highest speed.
 void watch_following(fieldbus::DriveSettings& settings, const description::DriveDescription& drive,
                      double following_error_rad) {
   const double v = drive.max_speed_rad_per_s, a = drive.max_acceleration_rad_per_s2;
@@ -107,7 +107,7 @@ Drives make_drives(const description::Cell& cell, const SessionSettings& setting
 
 struct Sensor {
   std::unique_ptr<fieldbus::ForceSensor> owned;
-  fieldbus::ModbusSensor* on_line = nullptr;  // `owned` itself, or null for a sensor on a CAN bus
+  fieldbus::ModbusSensor* on_line = nullptr;  // points to `owned`; null for a sensor on a CAN bus
 };
 
 Sensor build_sensor(const description::Cell& cell, const description::SensorDescription& sensor) {
@@ -136,7 +136,8 @@ Sensor build_sensor(const description::Cell& cell, const description::SensorDesc
   return {std::make_unique<fieldbus::DescribedSensor>(sensor, settings)};
 }
 
-// One worker and one connection per line. Each TCP drive has its own line; units behind a gateway share one.
+// Returns the lines with a worker and a connection each. A TCP drive has its own line; units behind a gateway share a
+// line.
 std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const description::Cell& cell,
                                                                 const std::vector<fieldbus::ModbusDrive*>& drives,
                                                                 fieldbus::ModbusSensor* sensor,
@@ -156,7 +157,7 @@ std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const descriptio
   return lines;
 }
 
-// The tool behind the sensor is felt by itself; (26) gets the rest of the wanted mass.
+// The tool behind the sensor is felt by itself. (26) gets the rest of the wanted mass.
 double proxy_mass(const description::Cell& cell, const SessionSettings& settings) {
   if (settings.mass_kg > cell.tool.mass_kg) return settings.mass_kg - cell.tool.mass_kg;
   throw SetupError({.key = "--mass",
@@ -166,7 +167,8 @@ double proxy_mass(const description::Cell& cell, const SessionSettings& settings
                     .advice = "ask for more mass, or use a lighter tool"});
 }
 
-// Relative to the orientation at the first start. The bounds for setpoints lie before the limits by a lead.
+// Returns the bounds of the tool's rotation from its orientation at the first start. The bounds are smaller than the
+// cell's limits by a lead, since setpoints lead the links (turn_sets.hpp).
 TurnSets turn_sets(const description::Cell& cell) {
   const description::CellLimits& limits = cell.limits;
   TurnSets sets;
@@ -194,8 +196,8 @@ OrientationConfig orientation_config(const description::Cell& cell, const Sessio
   return config;
 }
 
-// For a rigid tool. What hangs behind the sensor is subtracted from the mass and from the inertia, also from the
-// default inertia.
+// Returns the configuration of a rigid tool. The part behind the sensor is subtracted from the felt mass and from the
+// felt inertia, also from the default inertia.
 PoseWorldConfig pose_config(const description::Cell& cell, const SessionSettings& settings) {
   const models::ToolInertia behind = models::tool_inertia(cell.tool);
   PoseWorldConfig config;
@@ -214,7 +216,7 @@ PoseWorldConfig pose_config(const description::Cell& cell, const SessionSettings
   return config;
 }
 
-// Redirects the scene's friction and motion setters to the tool's 𝒢.
+// Compiles the tool's 𝒢, and redirects the scene's setters of friction and motion to it.
 std::unique_ptr<PoseWorld> make_pose_world(const description::Cell& cell, scenes::CompiledScene& scene,
                                            const SessionSettings& settings) {
   std::unique_ptr<models::PoseAlgorithm> g = scenes::compile_rigid(*scene.source, scene.source->tool->shape);
@@ -233,7 +235,7 @@ std::unique_ptr<RenderedTool> make_tool(const description::Cell& cell, scenes::C
                                      orientation_config(cell, settings), models::tool_inertia(cell.tool).about_T_kg_m2);
 }
 
-// The links' motion, for the passivity observer of a tool that turns.
+// Returns the model of the links' motion, which the passivity observer needs for a tool that turns.
 std::optional<LinkMotion> make_links(const description::Cell& cell, const models::Arm& arm,
                                      const SessionSettings& settings) {
   if (settings.orientation != OrientationMode::free || settings.passivity == Passivity::off) return std::nullopt;
@@ -272,7 +274,8 @@ std::optional<EnablingInput> make_enabling_input(const description::Cell& cell, 
   return EnablingInput(*cell.enabling_input, cell, bus_indices[index_of(cell, cell.enabling_input->bus)]);
 }
 
-// Several of the cell's buses may be on one interface; the controller itself uses NMT, SYNC and its heartbeat there.
+// Checks the identifiers on each interface, since several of the cell's buses may share an interface. The controller
+// itself uses the identifiers of NMT, SYNC and its heartbeat.
 void refuse_shared_identifiers(CycleParts& parts) {
   std::vector<fieldbus::UsedIdentifier> used;
   std::vector<std::string> names;
@@ -309,7 +312,7 @@ std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell
   return build_sensor(cell, sensor).owned;
 }
 
-// Drives in cst take torques, all others positions.
+// Drives in mode cst take torques, drives in all other modes take positions.
 void require_scheme(const description::Cell& cell, const SessionSettings& settings) {
   const bool torque = settings.scheme == Scheme::impedance;
   for (const description::DriveDescription& drive : cell.drives) {
@@ -369,7 +372,7 @@ std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) 
   for (const fieldbus::DriveSlot& slot : parts.can_drives) {
     if (slot.bus != bus) continue;
     for (const std::uint32_t id : slot.drive->wanted_ids()) ids.push_back(id);
-    // Also setpoints: received ones come from another master (Fault::second_master).
+    // Setpoints are let in, too: a received setpoint comes from another master (Fault::second_master).
     ids.push_back(fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, slot.drive->node()));
   }
   if (!ids.empty()) {

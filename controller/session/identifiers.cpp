@@ -21,13 +21,13 @@ struct Use {
   std::size_t interface = 0;
   std::uint32_t id = 0;
   std::string owner;
-  std::string key{};  // in the cell's file, the key that chooses it; empty: no key does
-  std::string bus{};  // of the cell
+  std::string key{};  // the key in the cell's file that chooses the identifier; empty: no key does
+  std::string bus{};  // name of the cell's bus
 };
 
 constexpr std::size_t no_interface = static_cast<std::size_t>(-1);
 
-// no_interface for a Modbus line.
+// Returns the interface of the cell's bus; no_interface for a Modbus line.
 std::size_t interface_of(const Cell& cell, const BusIndices& indices, const std::string& bus) {
   for (std::size_t i = 0; i < cell.buses.size(); ++i) {
     if (cell.buses[i].name == bus) return indices[i];
@@ -35,7 +35,8 @@ std::size_t interface_of(const Cell& cell, const BusIndices& indices, const std:
   return no_interface;
 }
 
-// The key that gives the sensor this identifier. Another setting, such as a divisor, may have the same value by chance.
+// Returns the key that gives the sensor this identifier. If several settings have the identifier as their value, such
+// as a divisor by chance, the key is "sensor.settings".
 std::string sensor_key(const Cell& cell, const SensorDescription& sensor, std::uint32_t id) {
   if (!sensor.described || sensor.described->has_base_id) return "sensor.base_id";
   if (!sensor.described->has_settings) return "sensor.bus";
@@ -45,7 +46,8 @@ std::string sensor_key(const Cell& cell, const SensorDescription& sensor, std::u
   return "sensor.settings." + std::find_if(settings.begin(), settings.end(), is_it)->name;
 }
 
-// The sensor refuses the identifiers of NMT and SYNC, but doesn't know which of its settings chose them.
+// Returns the key of the setting that was refused. The sensor refuses the identifiers of NMT and SYNC, but doesn't know
+// which of its settings chose them.
 std::string refused_key(const Cell& cell, const SensorDescription& sensor, const std::string& told) {
   if (told != "sensor.settings") return told;
   for (const std::uint32_t id : sensor.described->wire_ids(cell.sensor.base_id)) {
@@ -54,7 +56,7 @@ std::string refused_key(const Cell& cell, const SensorDescription& sensor, const
   return told;
 }
 
-// The sensor's identifiers; its refusals get the line of their key in the cell's file.
+// Returns the sensor's identifiers. A refusal by the sensor is thrown with the line of its key in the cell's file.
 std::vector<std::uint32_t> sensor_identifiers(const Cell& cell, const SensorDescription& sensor) {
   try {
     return make_sensor(cell, sensor)->used_ids();
@@ -127,7 +129,7 @@ void require_own_identifiers(const Cell& cell, const SensorDescription& sensor, 
   add_controller_and_drives(cell, bus_indices, uses);
   if (cell.enabling_input && !settings.without_enabling_input) add_enabling_input(cell, bus_indices, uses);
   add_sensor(cell, sensor, bus_indices, uses);
-  // Uses with a key of their own come last; the error names this key.
+  // Uses that a key of the cell chooses come last in `uses`. The error names this key.
   for (std::size_t b = 0; b < uses.size(); ++b) {
     for (std::size_t a = 0; a < b && !uses[b].key.empty(); ++a) {
       const bool same = uses[a].interface == uses[b].interface && uses[a].id == uses[b].id;

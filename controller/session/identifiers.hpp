@@ -1,4 +1,4 @@
-// Checks the CAN identifiers of a cell's devices from the files alone, before a bus is opened.
+// Checks the CAN identifiers of a cell's devices by means of the files alone, before a bus is opened.
 #pragma once
 
 #include "controller/session/bring_up.hpp"
@@ -7,9 +7,9 @@
 
 namespace proxarm::controller {
 
-// Throws SetupError with the cell's file, line and key if the cell's choices for the sensor are invalid, or if sensor
-// or enabling input share an identifier on one bus with the controller, a drive or each other. `bus_indices` tells
-// which of the cell's buses share an interface.
+// Throws SetupError with the cell's file, line and key in two cases. First: the cell's choices for the sensor are
+// invalid. Second: two of sensor, enabling input, controller and drives have the same identifier on one bus, and one of
+// these two is the sensor or the enabling input. `bus_indices` says which of the cell's buses share an interface.
 void require_own_identifiers(const description::Cell& cell, const description::SensorDescription& sensor,
                              const SessionSettings& settings, const BusIndices& bus_indices);
 

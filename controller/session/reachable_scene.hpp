@@ -6,8 +6,8 @@
 
 namespace proxarm::controller {
 
-// An empty scene becomes the line or plane that the tool can reach, if the arm can't move in all directions. Any other
-// scene is returned unchanged.
+// Returns the scene. If the scene is empty and the arm can't move in all directions, the scene's space becomes the line
+// or plane that the tool can reach.
 scenes::Scene reachable_scene(scenes::Scene scene, const description::Cell& cell);
 
 }  // namespace proxarm::controller

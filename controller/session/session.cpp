@@ -7,13 +7,13 @@ namespace proxarm::controller {
 
 namespace {
 
-// Requests the stop when the session has lasted long enough, and knows why it ended.
+// Requests the stop when the session has lasted long enough, and stores the reason for the end.
 class Ending {
  public:
   explicit Ending(const SessionLength& length)
       : wanted_ns_(std::llround(length.duration_s * 1e9)), longest_release_s_(length.longest_release_s) {}
 
-  // After the cycle at t_k.
+  // Called after the cycle at t_k.
   void judge(Cycle& cycle, std::int64_t t_k_ns) {
     const auto script = cycle.scheduled_commands();
     const bool awaits_order = !script.empty() && !script.back().taken;
@@ -27,7 +27,7 @@ class Ending {
     }
   }
 
-  // After the last cycle. A stop without fault and without request is a hold that lasted too long.
+  // Called after the last cycle. If the session stopped without a fault and without a request, a hold lasted too long.
   [[nodiscard]] SessionEnd reason(const Cycle& cycle) const {
     if (cycle.supervisor().faulted()) return SessionEnd::fault;
     return cycle.stop_requested() ? stopped_for_ : SessionEnd::hold_expired;
@@ -55,7 +55,7 @@ SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, const Sess
   std::uint32_t overruns_in_a_row = 0;
   std::int64_t t_k_ns = network.now_ns() + cycle.period_ns();
   const auto periods_since = [&](std::int64_t time_ns) { return (network.now_ns() - time_ns) / cycle.period_ns(); };
-  // A skipped cycle counts like a late one.
+  // Skips whole periods. A skipped cycle counts as late.
   const auto skip = [&](std::int64_t periods) {
     tally.skipped += static_cast<std::uint64_t>(periods);
     t_k_ns += periods * cycle.period_ns();
@@ -64,7 +64,7 @@ SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, const Sess
   };
   while (cycle.supervisor().phase() != Phase::done) {
     network.sleep_until(t_k_ns);
-    // Whole periods without a cycle: the process was suspended, or didn't get the processor.
+    // Whole periods passed without a cycle: the process was suspended, or didn't get the processor.
     if (const std::int64_t missed = periods_since(t_k_ns); missed > 0) {
       ++tally.overruns;
       skip(missed);
@@ -76,13 +76,14 @@ SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, const Sess
     if (hooks.after_cycle) hooks.after_cycle();
     if (tally.cycles == 1) before = thread_page_faults();
 
-    t_k_ns += cycle.period_ns();  // it may have changed in this cycle
+    t_k_ns += cycle.period_ns();  // the period may have changed in this cycle
     if (network.now_ns() > t_k_ns) {
       ++tally.overruns;
       ++overruns_in_a_row;
       skip(periods_since(t_k_ns));
     } else {
-      // A simulation that keeps pace with the clock waits for a late host; on a bus the next cycle would be due.
+      // A simulation that keeps pace with the clock waits for a late host. On a real bus, the next cycle would be due
+      // already.
       const bool waited_for = network.now_ns() + network.behind_ns() > t_k_ns;
       if (waited_for) ++tally.overruns;
       overruns_in_a_row = 0;

@@ -13,7 +13,7 @@ DerivedSignals SignalDeriver::derive(const CycleRecord& record) const {
     out.torques = out.torques || drive.mode == "cst";
     out.target_rad[i] = drive.angle_rad(record.target_counts[i]);
     out.actual_rad[i] = drive.angle_rad(record.actual_counts[i]);
-    // 6071h: thousandths of the rated torque, signed as the counts.
+    // 6071h is in thousandths of the rated torque, with the sign of the counts.
     out.target_Nm[i] = 1e-3 * drive.direction * record.target_counts[i] * drive.rated_torque_Nm;
   }
   const Eigen::Quaterniond q(arm_.tool_pose(link_rad(record)).linear());

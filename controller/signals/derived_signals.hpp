@@ -1,4 +1,4 @@
-// Signals derived from a cycle's record: joint angles and torques in SI units, and the tool's orientation. Not for the
+// Derives signals from a cycle's record: joint angles and torques in SI units, and the tool's orientation. Not for the
 // cycle: takes some microseconds.
 #pragma once
 
@@ -13,7 +13,7 @@ class SignalDeriver {
   // Precondition: the cell outlives this object. Throws SetupError.
   explicit SignalDeriver(const description::Cell& cell);
   [[nodiscard]] DerivedSignals derive(const CycleRecord& record) const;
-  // The links' angles by the encoders.
+  // Returns the links' angles by the encoders.
   [[nodiscard]] models::JointVector link_rad(const CycleRecord& record) const;
   [[nodiscard]] const models::Arm& arm() const noexcept { return arm_; }
 

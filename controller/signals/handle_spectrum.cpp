@@ -10,15 +10,16 @@ namespace {
 
 using models::Vec3;
 
-constexpr int first_band = 10, last_band = 26;  // 10^(n/10) Hz
-constexpr double hann_bandwidth = 1.5;          // lines
-constexpr double nearly = 0.01;                 // of a period: tolerance of a position's time
+constexpr int first_band = 10, last_band = 26;  // bands are at 10^(n/10) Hz, n from the first to the last
+constexpr double hann_bandwidth = 1.5;          // noise bandwidth of Hann's window, in lines
+constexpr double nearly = 0.01;                 // tolerance of the time between two positions, as a share of the period
 
 double hann(std::size_t i, std::size_t samples) noexcept {
   return 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(samples));
 }
 
-// Σ |X(f)|² over the axes. The phasor is rotated from sample to sample, which adds 1e-12 of rounding in a second.
+// Returns Σ |X(f)|² over the axes. The phasor is rotated from sample to sample, which adds a rounding error of 1e-12 in
+// a second.
 double power(const std::vector<Vec3>& x, double radians_per_sample) noexcept {
   const std::complex<double> turn = std::polar(1.0, -radians_per_sample);
   std::complex<double> phasor = 1.0;
@@ -78,7 +79,7 @@ std::vector<HandleSpectrum::Band> HandleSpectrum::bands() const {
          static_cast<double>(line) * line_Hz < high_Hz; ++line) {
       const double f_Hz = static_cast<double>(line) * line_Hz;
       const double radians = 2.0 * std::numbers::pi * f_Hz * period_s_;
-      // 2 |X|/Σw of the position with these second differences; Hann's Σw is n/2.
+      // 2 |X|/Σw of the position whose second differences these are. Σw of Hann's window is n/2.
       const double of_place = 4.0 / (static_cast<double>(n) * 2.0 * (1.0 - std::cos(radians)));
       const double squared = power(differences, radians);
       sum += of_place * of_place * squared;

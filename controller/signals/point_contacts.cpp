@@ -8,8 +8,8 @@ namespace {
 using models::Vec3;
 using Sizes = std::array<double, most_contacts>;
 
-// The sizes a ≥ 0 that minimise ‖f − Σ aᵢ nᵢ‖, by projected Gauss-Seidel. Each sweep reduces the error by a factor of 4
-// in a corner of 60°, by 1.03 in a corner of 10°; the rest then counts as friction.
+// Returns the sizes a ≥ 0 that minimise ‖f − Σ aᵢ nᵢ‖, by projected Gauss-Seidel. Each sweep divides the error by 4 in
+// a corner of 60°, and by 1.03 in a corner of 10°. The error that is left then counts as friction.
 Sizes pressing(std::span<const RecordedContact> contacts, const Vec3& f) noexcept {
   constexpr int sweeps = 200;
   Sizes sizes{};
@@ -25,7 +25,7 @@ Sizes pressing(std::span<const RecordedContact> contacts, const Vec3& f) noexcep
   return sizes;
 }
 
-// Each contact's share of the friction; the shares add up to 1.
+// Returns each contact's share of the friction. The shares add up to 1.
 Sizes rubbing(std::span<const RecordedContact> contacts, const Sizes& pressing) noexcept {
   Sizes shares{};
   double sum = 0.0;

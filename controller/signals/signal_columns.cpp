@@ -38,7 +38,7 @@ void put_first(auto& row, const CycleRecord& r, std::size_t axes, bool with_trut
   }
 }
 
-// Columns added after the first version of the record.
+// The columns that were added after the first version of the record.
 void put_more(auto& row, const CycleRecord& r, std::size_t axes, bool with_truth, const DerivedSignals& derived) {
   for (const Fault fault : {r.fault, r.held_for}) {
     row.word(fault == Fault::none ? "" : fault_name(fault), static_cast<int>(fault));
@@ -226,7 +226,7 @@ void append_stored(std::string& text, Form form, const std::vector<std::string>&
   const auto whole = static_cast<std::int64_t>(value);
   if (form == Form::integer) return append_number(text, whole);
   if (form == Form::word) {
-    // Only in a damaged file; phase_name() has the same text for invalid phases.
+    // This happens only in a damaged file. phase_name() returns the same text for invalid phases.
     text += whole >= 0 && static_cast<std::size_t>(whole) < words.size() ? words[static_cast<std::size_t>(whole)] : "?";
     return;
   }

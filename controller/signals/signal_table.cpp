@@ -31,9 +31,11 @@ constexpr std::uint32_t plain_version = 1, packed_version = 2;
 constexpr std::size_t page_bytes = 4096;
 constexpr std::size_t rows_of_block = SignalTableWriter::apart;
 static_assert(rows_of_block == page_bytes / sizeof(double));
-constexpr std::size_t rows_at_once = 64;  // written at once; as many as signals.csv's buffer holds
+// Number of rows that are written at once; as many as the buffer of signals.csv holds.
+constexpr std::size_t rows_at_once = 64;
 constexpr std::size_t json_begins_at = 24;
-// Far above the written value; bounds the memory that a damaged head can request.
+// Largest number of rows per block that is read, far above the number that is written. Bounds the memory that a damaged
+// head can request.
 constexpr std::size_t most_block_rows = 1 << 16;
 constexpr std::array<std::pair<Form, const char*>, 5> forms{{{Form::number, "number"},
                                                              {Form::integer, "integer"},
@@ -41,7 +43,7 @@ constexpr std::array<std::pair<Form, const char*>, 5> forms{{{Form::number, "num
                                                              {Form::word, "word"},
                                                              {Form::flags, "flags"}}};
 
-// Joined by bars, like the flags of signals.csv; no word contains one.
+// Returns the words joined by bars, like the flags of signals.csv. No word contains a bar.
 std::string joined(const std::vector<std::string>& words) {
   std::string text = words[0];
   for (std::size_t i = 1; i < words.size(); ++i) text += "|" + words[i];
@@ -121,7 +123,7 @@ void SignalTableWriter::write(const void* data, std::size_t bytes, std::size_t a
   }
 }
 
-// The first column is written last: it shows which rows exist, so these are complete even if the session dies.
+// Writes the first column last. It shows which rows exist, so these rows are complete even if the session dies.
 void SignalTableWriter::write_block() {
   constexpr std::size_t column_bytes = rows_of_block * sizeof(double);
   write(block_.data() + rows_of_block, (columns_ - 1) * column_bytes, begins_at_ + column_bytes);
@@ -220,7 +222,7 @@ void SignalTable::read_columns() {
   }
 }
 
-// Only complete blocks.
+// Finds the complete blocks.
 void SignalTable::find_blocks() {
   const std::size_t plain_bytes = columns_.size() * block_rows_ * sizeof(double);
   for (std::size_t at = first_block_; at < bytes_;) {
@@ -237,7 +239,7 @@ void SignalTable::find_blocks() {
   }
 }
 
-// The last block's rows end before the first one without a cycle number.
+// Counts the rows. In the last block, rows end before the first row without a cycle number.
 void SignalTable::count_rows() {
   rows_ = blocks_.size() * block_rows_;
   while (rows_ > 0 && rows_ + block_rows_ > blocks_.size() * block_rows_ && is_empty(value(rows_ - 1, 0))) --rows_;

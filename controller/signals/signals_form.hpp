@@ -5,7 +5,7 @@
 
 namespace proxarm::controller {
 
-// Signals and contacts as text, as numbers, or as packed numbers; packed also applies to frames.log.
+// Signals and contacts are written as text, as numbers, or as packed numbers. `packed` also applies to frames.log.
 enum class SignalsForm : std::uint8_t { csv, binary, packed };
 
 }  // namespace proxarm::controller

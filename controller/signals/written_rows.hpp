@@ -1,5 +1,5 @@
-// Writes a table's row as text (.csv) or as numbers (.bin), with the same calls for both, one per column. Only for the
-// sources of this folder.
+// Writes a row of a table as text (.csv) or as numbers (.bin). Both writers have the same functions, and each column is
+// one call. Only for the sources of this folder.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ void append_number(std::string& text, Number value) {
   text.append(digits.data(), end);
 }
 
-// Nanoseconds as seconds, digit by digit: 1250000 is 0.00125.
+// Appends nanoseconds as seconds, digit by digit: 1250000 is 0.00125.
 inline void append_seconds(std::string& text, std::int64_t ns, std::size_t least_decimals) {
   if (ns < 0) text += '-';
   const std::uint64_t size = ns < 0 ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
@@ -30,7 +30,8 @@ inline void append_seconds(std::string& text, std::int64_t ns, std::size_t least
   if (!decimals.empty()) text += "." + decimals;
 }
 
-// Without `overrun`, which depends on the wall clock, and without `truth`, which the columns show.
+// The flags that are written. `overrun` is left out because it depends on the wall clock, `truth` because the columns
+// show it.
 inline constexpr std::array written_flags{RecordFlag::sample_held,
                                           RecordFlag::sample_late,
                                           RecordFlag::feedback_missing,
@@ -101,7 +102,7 @@ class NumberRow {
     *at_ = value;
     at_ += apart_;
   }
-  // Both are exact, so the quotient is the double nearest to the decimals.
+  // Both operands are exact, so the quotient is the double that is nearest to the decimal number.
   void seconds(std::int64_t ns) noexcept { number(static_cast<double>(ns) / 1e9); }
   void word(const char* /*name*/, int value) noexcept { integer(value); }
   void empty() noexcept { number(std::bit_cast<double>(empty_bits)); }
@@ -130,7 +131,7 @@ class Columns {
     add(std::move(name), "", "", std::move(meaning), form);
     all.back().words = std::move(words);
   }
-  // "force_W_x_N": a name, an axis, a unit.
+  // Names the three columns by the vector's name, an axis and the unit: "force_W_x_N".
   void add_vector(const std::string& name, const std::string& unit, const std::string& frame,
                   const std::string& meaning) {
     const std::string shown = unit == "m/s²" ? "m_per_s2" : unit;

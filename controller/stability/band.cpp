@@ -9,10 +9,11 @@ using models::Vec3;
 
 namespace {
 
-constexpr double ripple_left = 0.02;    // `left` of the header
-constexpr double highest_share = 0.45;  // of the cycle's rate; the bilinear transform ends at 0.5
+constexpr double ripple_left = 0.02;  // `left` of the header
+constexpr double highest_share =
+    0.45;  // largest f_c, as a share of the cycle's rate; the bilinear transform ends at 0.5
 
-// f_c; 0: no low-pass.
+// Returns f_c in Hz; 0: no low-pass.
 double top_Hz(double report_rate_Hz, double period_s) noexcept {
   if (!(report_rate_Hz > 0.0)) return 0.0;
   const double cycles = 1.0 / (report_rate_Hz * period_s);  // N
@@ -23,9 +24,10 @@ double top_Hz(double report_rate_Hz, double period_s) noexcept {
 
 }  // namespace
 
-// Bilinear transform, prewarped to keep the corner frequency: Ω = tan(π f T), and with quality Q
-//   a₁ = 2(Ω² − 1)/(1 + Ω/Q + Ω²),   a₂ = (1 − Ω/Q + Ω²)/(1 + Ω/Q + Ω²),
-// with the gain 1/(1 + Ω/Q + Ω²) of a high-pass, and Ω² times that of a low-pass.
+// Designs a section by the bilinear transform, prewarped to keep the corner frequency. With Ω = tan(π f T) and the
+// quality Q:
+//   a₁ = 2(Ω² − 1)/(1 + Ω/Q + Ω²),   a₂ = (1 − Ω/Q + Ω²)/(1 + Ω/Q + Ω²)
+// The gain of a high-pass is 1/(1 + Ω/Q + Ω²). The gain of a low-pass is Ω²/(1 + Ω/Q + Ω²).
 void Band::Section::design(double omega, double inverse_quality, double b1_of_kind) noexcept {
   const double damping = inverse_quality * omega;  // Ω/Q
   const double scale = 1.0 / (1.0 + damping + omega * omega);
@@ -44,7 +46,7 @@ Vec3 Band::Section::step(const Vec3& in) noexcept {
 
 void Band::design(const BandLimits& limits, double period_s) noexcept {
   const double pi = std::numbers::pi, omega = std::tan(pi * limits.low_Hz * period_s);
-  const std::array angles{pi / 8.0, 3.0 * pi / 8.0};  // of Butterworth's poles
+  const std::array angles{pi / 8.0, 3.0 * pi / 8.0};  // angles of Butterworth's poles
   for (std::size_t i = 0; i < bottom_.size(); ++i) bottom_[i].design(omega, 2.0 * std::cos(angles[i]), -2.0);
   const double corner_Hz = top_Hz(limits.report_rate_Hz, period_s);
   smooths_ = corner_Hz > 0.0;

@@ -1,13 +1,18 @@
-// The band-pass for detecting oscillations. Forces and motions pass through the same filter, which keeps their phase.
+// A band-pass filter for detecting oscillations. Forces and motions pass through the same filter, which keeps the phase
+// between them.
 //
-// A Butterworth high-pass of order 4 removes deliberate hand motion. Above the band there is signal only if a joint
-// reports its position less often than the cycle runs, at f_r: the position then stands and jumps. At a constant speed
-// v and N = 1/(f_r T) cycles per report, the speed per cycle has the mean square N v²: v² plus a ripple of (N − 1) v²
-// at f_r and beyond. A Butterworth low-pass of order 2 leaves (f_c/f_r)⁴ of the ripple; with
-//   f_c = f_r (left/(N − 1))^¼
-// this is `left` = 0.02 of v², a tenth of the smallest share that counts as an oscillation. At 200 reports a second and
-// 1 ms the corner is 53 Hz. There is no low-pass if all joints report in each cycle, or if f_c is near half of the
-// cycle's rate.
+// A Butterworth high-pass of order 4 removes deliberate hand motion. A Butterworth low-pass of order 2 acts only if a
+// joint reports its position less often than the cycle runs: the reported position then stands still and jumps. The
+// joint has f_r reports a second, so a report comes in every Nth cycle, N = 1/(f_r T). The low-pass's corner frequency
+// f_c follows in three steps:
+// 1. At a constant speed v, the speed per cycle has the mean square N v²: v² itself, and a ripple of (N − 1) v² at f_r
+//    and beyond.
+// 2. The low-pass leaves (f_c/f_r)⁴ of the ripple.
+// 3. With f_c = f_r (left/(N − 1))^¼, the rest of the ripple is `left` = 0.02 of v². This is a tenth of the smallest
+//    share that counts as an oscillation.
+//
+// At 200 reports a second and T = 1 ms, f_c is 53 Hz. There is no low-pass if all joints report in each cycle, or if
+// f_c is near half of the cycle's rate.
 #pragma once
 
 #include <array>
@@ -26,7 +31,8 @@ class Band {
  public:
   void design(const BandLimits& limits, double period_s) noexcept;
   void reset() noexcept;
-  // smooth(): the low-pass, called once per cycle. above(): the high-pass, applied to the result of smooth().
+  // smooth() applies the low-pass, above() applies the high-pass to the result of smooth(), and step() does both.
+  // Precondition: each filter is called once per cycle.
   models::Vec3 smooth(const models::Vec3& in) noexcept { return smooths_ ? top_.step(in) : in; }
   models::Vec3 above(const models::Vec3& smoothed) noexcept { return bottom_[1].step(bottom_[0].step(smoothed)); }
   models::Vec3 step(const models::Vec3& in) noexcept { return above(smooth(in)); }
@@ -35,7 +41,8 @@ class Band {
   }
 
  private:
-  struct Section {  // second order, transposed direct form II: gain (1 ± 2z⁻¹ + z⁻²)/(1 + a₁z⁻¹ + a₂z⁻²)
+  // A second-order filter in transposed direct form II: gain (1 ± 2z⁻¹ + z⁻²)/(1 + a₁z⁻¹ + a₂z⁻²).
+  struct Section {
     double gain = 1.0, a1 = 0.0, a2 = 0.0;
     double b1 = -2.0;  // −2 of a high-pass, 2 of a low-pass
     models::Vec3 s1 = models::Vec3::Zero(), s2 = models::Vec3::Zero();

@@ -1,4 +1,4 @@
-// A delay by τ, for vectors: the all-pass of the second-order Padé approximation
+// Delays vectors by τ. The filter is an all-pass, the second-order Padé approximation
 //   e^(−sτ) ≈ (s²τ² − 6sτ + 12)/(s²τ² + 6sτ + 12)      phase within 0.1° up to ωτ = 1.5, 2° up to 2.5; magnitude 1
 // discretised by the bilinear transform, s = (2/T)(1 − z⁻¹)/(1 + z⁻¹). With c = 2τ/T, in transposed direct form II:
 //   (a₂ + a₁z⁻¹ + z⁻²)/(1 + a₁z⁻¹ + a₂z⁻²),   a₀ = c² + 6c + 12,   a₁ = (24 − 2c²)/a₀,   a₂ = (c² − 6c + 12)/a₀
@@ -8,7 +8,7 @@ namespace proxarm::controller {
 
 template <typename Vector>
 struct Delay {
-  bool acts = false;  // false below half a period: nothing is delayed
+  bool acts = false;  // false if τ is below half a period: step() then returns its input
   double a1 = 0.0, a2 = 0.0;
   Vector s1, s2;
 

@@ -23,8 +23,8 @@ using Eigen::VectorXd;
 using models::product;
 using models::transposed_product;
 
-// exp(A) by scaling and squaring: Taylor's series of A/2ˢ, squared s times. Its norm is below 1/2, so 18 terms leave
-// 1e-22.
+// Returns exp(A) by scaling and squaring: Taylor's series of A/2ˢ, squared s times. The norm of A/2ˢ is below 1/2, so
+// the error after 18 terms is 1e-22.
 MatrixXd exponential(MatrixXd A) {
   const double norm = A.cwiseAbs().rowwise().sum().maxCoeff();
   const int squarings = std::max(0, static_cast<int>(std::ceil(std::log2(norm))) + 1);
@@ -38,7 +38,7 @@ MatrixXd exponential(MatrixXd A) {
   return sum;
 }
 
-// A(w) T² = Σ (mass_i M + damping_i BT + spring_i K_vT²) wⁱ.
+// Coefficients of A(w) T² = Σ (mass_i M + damping_i BT + spring_i K_vT²) wⁱ.
 struct ProxyPolynomial {
   std::array<double, 6> mass{1.0, -2.0, 1.0}, damping{}, spring{};
 };
@@ -57,8 +57,8 @@ ProxyPolynomial proxy_polynomial(int order) {
   return A;
 }
 
-// An age in periods. Values between two periods are interpolated linearly. 1e-9 absorbs the rounding of a quotient of
-// decimal numbers.
+// An age in periods, as whole periods and a rest. A value at this age is interpolated linearly between two periods.
+// 1e-9 absorbs the rounding of `periods`, a quotient of decimal numbers.
 struct Age {
   explicit Age(double periods)
       : whole(static_cast<Index>(std::floor(periods + 1e-9))),
@@ -67,7 +67,8 @@ struct Age {
   double rest;
 };
 
-// Damping ratio of the arm's first mode, and the frequency of a rigid gear, far above all others here.
+// Damping ratio of the arm's first mode for gears without a known damping. Frequency of a rigid gear, far above all
+// other frequencies here.
 constexpr double ringing = 0.03, rigid_Hz = 300.0;
 
 }  // namespace
@@ -79,7 +80,7 @@ constexpr double velocity_share = 2.0, place_share = 0.25, integral_share = 0.1;
 void add_drives(const description::Cell& cell, ElasticArm& arm) {
   constexpr double pi = std::numbers::pi, least = 0.02, none_kg_m2 = 1e6;
   VectorXd rotor(arm.stiffness.size()), omega(arm.stiffness.size());
-  double yields = 0.0;  // as a share of the gear's twist
+  double yields = 0.0;  // largest static δ of a joint, as a share of its gear's twist
   for (Index i = 0; i < rotor.size(); ++i) {
     const description::DriveDescription& drive = cell.drives[static_cast<std::size_t>(i)];
     rotor[i] = drive.rotor_inertia_kg_m2 > 0.0 ? drive.rotor_inertia_kg_m2 : none_kg_m2;
@@ -165,7 +166,7 @@ class LedArm {
     return {start_.translation() + lead.offset_m,
             (models::rotation_by(lead.turn_rad) * models::Quaternion(start_.linear())).normalized()};
   }
-  // Moves straight, as far as the arm reaches; false if it can't move at all.
+  // Moves the tool in a straight line, as far as the arm reaches. Returns false if the tool can't move at all.
   bool lead_to(const Lead& lead) {
     // Away from singularities, these steps turn each joint by less than the inverse kinematics' 0.01 rad.
     constexpr double step_m = 0.005, step_rad = 0.005, most_steps = 400.0;
@@ -219,9 +220,14 @@ std::vector<models::JointVector> led_poses(const models::Arm& arm, const std::ve
   return poses;
 }
 
-// Indices into the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, proxies, the filter's
-// x_f and ẋ_f, the kept forces, the drives' [δ, δ̇, ∫δ] and [θ̇, f]; with torque-damped gears the kept torques,
-// modelled accelerations and filter states.
+// Indices of the parts of the state at a period's beginning, in this order:
+// - the plant's [φ, φ̇, θ];
+// - the last two setpoints;
+// - the proxy's last positions;
+// - the setpoint filter's x_f and ẋ_f;
+// - the kept forces;
+// - the yielding drives' [δ, δ̇, ∫δ], and the feed-forward drives' [θ̇, f];
+// - with torque-damped gears: the kept torques, the kept modelled accelerations, and the damping's filter states.
 struct ElasticLoop::State {
   Index n, d, ages, kept, drives, forward, damped, torques, models;
   [[nodiscard]] Index plant() const { return 0; }
@@ -238,7 +244,7 @@ struct ElasticLoop::State {
 };
 
 namespace {
-// The same hand and handle in each of d directions.
+// Returns a grip with this hand and handle in each of d directions.
 Grip grip_of(const HandModel& hand, double handle_kg, Index d) {
   const MatrixXd one = MatrixXd::Identity(d, d);
   return {hand.stiffness_N_per_m * one, hand.damping_Ns_per_m * one, hand.mass_kg * one, handle_kg * one};
@@ -274,19 +280,20 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopMode
     of_damped_ = MatrixXd::Identity(joints_, joints_)(damped, Eigen::all);
     yields_ = loop.gear_damping.damping_per_s * arm.stiffness.cwiseInverse().asDiagonal() * of_damped_.transpose();
   }
-  // 1e-9 absorbs the rounding of a quotient of decimal numbers. Besides the newest force, one older is kept for the
-  // interpolation, and two for Störmer's correction at order 2.
+  // 1e-9 absorbs the rounding of a quotient of decimal numbers. At order 1, two ages more than the whole periods are
+  // kept, for the interpolation. At order 2, one more is kept, for Störmer's correction.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + (order_ == 2 ? 3 : 2);
   twist_ = product(arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass, arm_.joints_per_m);
   make_plant(grip, loop.gear_stiffness_ratio);
-  // h = −K_h Jφ − D_h Jφ̇ − (m_h + m_t) Jφ̈, with φ̈ the plant's second block of rows.
+  // h = −K_h Jφ − D_h Jφ̇ − (m_h + m_t) Jφ̈. φ̈ is the plant's second block of rows, which make_plant() left in force_.
   const MatrixXd& J = arm_.jacobian;
   force_ = product(product(-(grip.hand_mass + grip.handle_mass), J), force_);
   force_.leftCols(joints_) -= product(grip.stiffness, J);
   force_.middleCols(joints_, joints_) -= product(grip.damping, J);
 }
 
-// ż = A z for z = [φ, φ̇, θ, r, ṙ, δ, δ̇, ∫δ, θ̇, f, ḟ] with ṙ and ḟ constant. Leaves the rows of φ̈ in force_.
+// Computes plant_, the map over a period of ż = A z with z = [φ, φ̇, θ, r, ṙ, δ, δ̇, ∫δ, θ̇, f, ḟ] and constant ṙ and
+// ḟ. Leaves the rows of φ̈ in force_.
 void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   const Index n = joints_;
   const MatrixXd& J = arm_.jacobian;
@@ -298,7 +305,7 @@ void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   const MatrixXd one = MatrixXd::Identity(n, n);
   block(0, 1) = one;
   block(3, 4) = one;
-  // θ̇ = (r − θ)/τ. Without a lag, θ is r and has its speed.
+  // With a lag, θ̇ = (r − θ)/τ. Without a lag, θ is r and moves with the speed ṙ.
   if (feeds_forward_) {
     const double omega_v = velocity_share / time_constant_s_;
     const Index at = 5 * n + drives_;
@@ -315,7 +322,7 @@ void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   } else {
     block(2, 4) = one;
   }
-  MatrixXd gear = MatrixXd::Zero(n, A.cols());  // its torque on the link
+  MatrixXd gear = MatrixXd::Zero(n, A.cols());  // the gears' torque on the links
   gear.leftCols(n) = -k;
   gear.middleCols(n, n) = -d;
   gear.middleCols(2 * n, n) = k;
@@ -341,7 +348,7 @@ void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   plant_ = exponential(A * period_s_);
 }
 
-// q(k) = Σ X_i q(k−i) + X₀ h; forces along N cancel motion in forbidden directions.
+// Returns the coefficients X of q(k) = Σ X_i q(k−i) + X₀ h. Forces along N cancel the motion in forbidden directions.
 ElasticLoop::Step ElasticLoop::step_of(const ProxyMatrices& proxy, const MatrixXd& N) const {
   const double T = period_s_;
   const ProxyPolynomial A = proxy_polynomial(order_);
@@ -367,14 +374,15 @@ Index ElasticLoop::size() const noexcept {
 
 Index ElasticLoop::plant_size() const noexcept { return 5 * joints_ + drives_ + (feeds_forward_ ? 3 * joints_ : 0); }
 
-// One period, from just before one reading of the sensor to just before the next.
+// Advances the state by one period, from just before one reading of the sensor to just before the next reading.
 void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& next) const {
   const Index n = joints_, d = dimensions_;
   const State at{n, d, ages_, proxies_, drives_, forward_, of_damped_.rows(), kept_torques(), kept_models()};
   const double T = period_s_;
   const auto old_sent = state.segment(at.sent() + n, n), last_sent = state.segment(at.sent(), n);
 
-  // The present force follows from the slope of the setpoints in the period before, at whose end θ and r meet.
+  // The present force follows from z. r is now at the older of the last two setpoints, and reaches the newer one at the
+  // end of this period.
   VectorXd z = VectorXd::Zero(plant_size());
   z.head(3 * n) = state.head(3 * n);
   if (!(time_constant_s_ > 0.0))
@@ -403,7 +411,7 @@ void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& nex
     q += step.of_proxies[static_cast<std::size_t>(i - 1)] * state.segment(at.proxies() + d * (i - 1), d);
   const Place p = q + horizon_s_ / T * (q - state.segment(at.proxies(), d));
 
-  // As in ElasticSetpoint::step().
+  // The setpoint filter, as in ElasticSetpoint::step().
   Place x = p, v = Place::Zero(d), acceleration = Place::Zero(d), mean_acceleration = Place::Zero(d);
   if (arm_.filter_s > 0.0) {
     const double omega = 1.0 / arm_.filter_s, decay = std::exp(-omega * T);
@@ -434,8 +442,8 @@ Index ElasticLoop::kept_torques() const noexcept { return damps() ? Age(torque_a
 
 Index ElasticLoop::kept_models() const noexcept { return damps() ? Age(torque_lag_periods_).whole + 1 : 0; }
 
-// As in GearDamping::step(): subtracts the damping from the setpoint that is sent. M G ẍ_f is the torque that the
-// filter's acceleration requires of the gears.
+// Subtracts the gears' damping from the setpoint that is sent, as GearDamping::step() does. M G ẍ_f is the torque that
+// the filter's acceleration requires of the gears.
 void ElasticLoop::damp(const VectorXd& state, const VectorXd& torque_now, const VectorXd& carried,
                        const Place& acceleration, VectorXd& next) const {
   const Index n = of_damped_.rows(), d = dimensions_, torques = kept_torques(), models = kept_models();

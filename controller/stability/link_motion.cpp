@@ -26,8 +26,8 @@ void LinkMotion::start(const JointVector& resting_rad) noexcept {
   delay_.reset(speed_);
 }
 
-// M − Jᵀ M_h J. A twist (v, ω) of T gives the part behind the sensor the momentum m(v − c × ω), and about T the angular
-// momentum m c × v + I ω.
+// Returns M − Jᵀ M_h J. With the twist (v, ω) of T, the part behind the sensor has the momentum m(v − c × ω), and about
+// T the angular momentum m c × v + I ω.
 JointMatrix LinkMotion::mass(const models::ToolKinematics& at) const noexcept {
   JointMatrix M = arm_->link_mass_matrix(at.q_rad);
   const models::ToolInertia& h = config_.behind_sensor;

@@ -1,5 +1,5 @@
 // Order 2's weights as polynomials in w, one period of delay. They are written from the equations, independently of the
-// proxy's own in controller/proxies/force_weights.cpp, so that a test of one against the other is meaningful.
+// proxy's weights in controller/proxies/force_weights.cpp, so that a test that compares both is meaningful.
 #pragma once
 
 #include <array>

@@ -33,7 +33,7 @@ bool PassedPoses::is_new(const models::ToolPose& tool_W, const Felt& felt) {
 }
 
 namespace {
-// Whether an unstable place requires more than `factor` times what the others do.
+// Returns whether the unstable place `there` requires more than `factor` times what `others` require.
 bool asks_for_more(const UnstablePlaces& there, const std::optional<UnstablePlaces>& others, double factor) {
   if (!others || there.lacks_mass != others->lacks_mass) return !others || there.lacks_mass;
   return there.smallest_stable.value_or(HUGE_VAL) > factor * others->smallest_stable.value_or(HUGE_VAL);
@@ -69,7 +69,7 @@ LoopModel PassedPoses::loop_at(const Asked& asked) const {
   return loop;
 }
 
-// Felt mass, including what hangs behind the sensor.
+// Returns the felt mass, including the part behind the sensor.
 std::optional<double> PassedPoses::smallest_mass(const LoopModel& loop) const {
   std::optional<double> smallest = smallest_stable_mass(hand_, loop);
   if (smallest) *smallest += loop.handle_mass_kg;
@@ -95,7 +95,8 @@ std::optional<UnstablePlaces> PassedPoses::unstable_at(const Asked& asked, const
   return there;
 }
 
-// If the reported inertia is stable here, too, this place requires no more and isn't searched.
+// If an inertia was reported for an earlier place and is stable here, too, then this place requires no more and isn't
+// searched.
 std::optional<double> PassedPoses::smallest_inertia(const PoseLoop& both, double mass_kg) const {
   const bool known = told_ && !told_->lacks_mass && told_->smallest_stable;
   if (known && both.stable(mass_kg, *told_->smallest_stable)) return told_->smallest_stable;

@@ -3,7 +3,7 @@
 
 namespace proxarm::controller {
 
-// Energies in J since rendering began; for a tool that turns, rotation included.
+// Energies in J since rendering began. They include the rotation of a tool that turns.
 struct PortEnergies {
   double hand = 0.0;     // W_h
   double proxy = 0.0;    // W_p

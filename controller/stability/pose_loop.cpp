@@ -32,14 +32,14 @@ Grip grip_of(const PoseLoopModel& model) {
           model.behind_sensor_W};
 }
 
-// N of the point r, held in these directions.
+// Returns N of the point r, which is held in the first `count` directions.
 MatrixXd held(const Vec3& r, const models::Mat3& directions, Eigen::Index count) {
   MatrixXd N(6, count);
   for (Eigen::Index i = 0; i < count; ++i) N.col(i) << directions.col(i), r.cross(directions.col(i));
   return N;
 }
 
-// An orthonormal basis that begins with n.
+// Returns an orthonormal basis that begins with n.
 models::Mat3 beside(const Vec3& n) {
   models::Mat3 directions;
   directions.col(0) = n;
@@ -48,7 +48,8 @@ models::Mat3 beside(const Vec3& n) {
   return directions;
 }
 
-// Loops with both kinds of drive, since the cell doesn't say which it has. Without a time constant both are the same.
+// Returns a loop for each kind of drive, since the cell doesn't say which kind it has. Without a time constant, both
+// kinds are equal, and one loop suffices.
 std::vector<ElasticLoop> with_both_drives(const ElasticArm& arm, const PoseLoopModel& model) {
   const Grip grip = grip_of(model);
   LoopModel loop = model.loop;
@@ -116,7 +117,7 @@ ProxyMatrices PoseLoop::proxy(const Touch& touch, double mass_kg, double inertia
 
 bool PoseLoop::stable(const ElasticLoop& loop, const Touch& touch, double mass_kg, double inertia_kg_m2) const {
   const ProxyMatrices lighter = proxy(touch, mass_kg, inertia_kg_m2, elastic_margin);
-  // Otherwise the part behind the sensor exceeds the requested mass or inertia.
+  // If `lighter.mass` isn't positive definite, the part behind the sensor exceeds the requested mass or inertia.
   if (Eigen::LLT<MatrixXd>(lighter.mass).info() != Eigen::Success) return false;
   return loop.spectral_radius(lighter, touch.forbidden) < 1.0;
 }
@@ -128,7 +129,7 @@ bool PoseLoop::stable(double mass_kg, double inertia_kg_m2) const {
   });
 }
 
-// Most contacts are stable at the inertia that others require; these aren't searched.
+// Most contacts are stable at the inertia that earlier contacts require; these contacts aren't searched.
 std::optional<double> PoseLoop::smallest_inertia(double mass_kg) const {
   constexpr double least_kg_m2 = 1e-6, close_enough = 1.005;
   double smallest = 0.0;
@@ -145,8 +146,8 @@ std::optional<double> PoseLoop::smallest_inertia(double mass_kg) const {
 }
 
 namespace {
-// Whether a mode swings: half a period later, on the other side, more than a tenth of it is left. Other modes fall to
-// the reported tenth before they swing back.
+// Returns whether a mode swings: half a period later, on the other side, more than a tenth of its amplitude is left.
+// Other modes fall to a tenth, the reported share, before they swing back.
 bool swings(const std::complex<double>& s) { return s.real() * std::numbers::pi > std::log(0.1) * std::abs(s.imag()); }
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Searches the smallest value of a quantity for which a condition holds.
+// Searches for the smallest value of a quantity for which a condition holds.
 #pragma once
 
 #include <cmath>
@@ -6,9 +6,9 @@
 
 namespace proxarm::controller {
 
-// Tries values from `largest` down to `least` until one doesn't hold, then bisects the last step to a ratio of
-// `close_enough`. nullopt: `largest` doesn't hold. An interval of failing values between holding ones is missed if it
-// is narrower than a step.
+// Returns the smallest value for which `holds` is true, to a ratio of `close_enough`; nullopt if `largest` fails.
+// Divides `largest` by 1.4 until a value fails or is below `least`, then bisects the last step. Misses an interval of
+// failing values between holding values if the interval is narrower than a step.
 template <typename Holds>
 std::optional<double> smallest_from_above(Holds holds, double largest, double least, double close_enough) {
   constexpr double step = 1.4;

@@ -7,9 +7,9 @@
 namespace proxarm::controller {
 namespace {
 
-// Shares of the largest remembered ⟨x̃²⟩: above the first, the oscillation is steady; below the second, it doesn't
-// last; below the third, it is over. Between the first two it may decay, and must go on for decaying_s and
-// lasting_periods.
+// Shares of the largest remembered ⟨x̃²⟩. Above steady_share, the oscillation is steady. Between steady_share and
+// kept_share, the oscillation may decay, and must go on for decaying_s and lasting_periods. Below kept_share, the
+// oscillation doesn't last. Below died_away, it is over.
 constexpr double steady_share = 0.9, kept_share = 0.5, died_away = 1.0 / 16.0;
 
 }  // namespace

@@ -47,9 +47,9 @@ Polynomial polynomial(const std::array<double, N>& coefficients) {
   return {coefficients.begin(), coefficients.end()};
 }
 
-// w^n for n ≥ 0, also for fractions.
+// Returns w^n for n = `periods` ≥ 0. A fraction of a period is interpolated linearly.
 Polynomial delay(double periods) {
-  // L/T is a quotient of decimal numbers; rounding may put it just below a whole number.
+  // 1e-9, because L/T is a quotient of decimal numbers, and rounding may put the quotient just below a whole number.
   const double whole = std::floor(periods + 1e-9), rest = std::max(0.0, periods - whole);
   Polynomial w(static_cast<std::size_t>(whole) + 2, 0.0);
   w[static_cast<std::size_t>(whole)] = 1.0 - rest;
@@ -58,7 +58,7 @@ Polynomial delay(double periods) {
   return w;
 }
 
-// C(w) = M X(w) + Y(w), times T² so that the coefficients have similar sizes.
+// X and Y of C(w) = M X(w) + Y(w), both multiplied by T² so that the coefficients have similar sizes.
 struct Loop {
   Polynomial X, Y;
 };
@@ -72,7 +72,7 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   const double delay_s = std::max(0.0, loop.delay_s - 2.0 * loop.filter_s);
   const Polynomial damper = loop.explicit_damping ? Polynomial{0.0, 1.0} * difference
                             : loop.order == 2     ? polynomial(order2_difference)
-                                                  : difference;  // times T
+                                                  : difference;  // difference quotient times T
   const double m = hand.mass_kg + loop.handle_mass_kg;
   const Polynomial grip = Polynomial{hand.stiffness_N_per_m * T * T} + hand.damping_Ns_per_m * T * difference +
                           m * (difference * difference);
@@ -88,7 +88,8 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   return {lag * (difference * difference), lag * own + force};
 }
 
-// Horner's scheme written out: std::complex tests each product for NaN, which would take most of a sweep's time.
+// Returns p(w) by Horner's scheme, written out: std::complex would test each product for NaN, which would take most of
+// a sweep's time.
 Complex evaluate(const Polynomial& p, Complex w) {
   double re = 0.0, im = 0.0;
   for (std::size_t i = p.size(); i-- > 0;) {
@@ -99,7 +100,8 @@ Complex evaluate(const Polynomial& p, Complex w) {
   return {re, im};
 }
 
-// The roots z = 1/w of C, as eigenvalues of the companion matrix of zⁿ C(1/z).
+// Returns the largest |z| of the roots z = 1/w of C. The roots are the eigenvalues of the companion matrix of zⁿ
+// C(1/z).
 double spectral_radius(const Loop& loop, double M) {
   Polynomial c = M * loop.X + loop.Y;
   while (c.size() > 1 && c.back() == 0.0) c.pop_back();
@@ -115,7 +117,7 @@ double spectral_radius(const Loop& loop, double M) {
 
 Complex on_circle(double theta) { return std::polar(1.0, -theta); }
 
-// Im(−Y/X) up to a positive factor. Where it changes sign, a real mass puts a root at exp(jθ).
+// Returns Im(−Y/X) up to a positive factor. Where the result changes sign, a real mass puts a root at z = exp(jθ).
 double imaginary_part(const Loop& loop, double theta) {
   const Complex w = on_circle(theta);
   return (-evaluate(loop.Y, w) * std::conj(evaluate(loop.X, w))).imag();
@@ -126,11 +128,11 @@ double mass_at(const Loop& loop, double theta) {
   return (-evaluate(loop.Y, w) / evaluate(loop.X, w)).real();
 }
 
-// All masses in (0, max] that put a root on the unit circle, in descending order.
+// Returns all masses in (0, max_mass_kg] that put a root on the unit circle, in descending order.
 std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
   constexpr double pi = std::numbers::pi;
-  // The grid of θ has 200 points per decade at its lower end: the slow roots of a large mass are at θ = T√(K/M). At its
-  // upper end it has at least 40 points for each turn of w^n around the circle.
+  // The grid of θ has 200 points per decade at its lower end, because a large mass M has slow roots, at θ = T√(K/M). At
+  // its upper end the grid has at least 40 points for each turn of w^n around the circle.
   std::vector<double> grid;
   for (int i = 0; i <= 1200; ++i) grid.push_back(0.1 * std::pow(10.0, (i - 1200) / 200.0));
   const std::size_t even = 40 * std::max<std::size_t>(loop.Y.size(), 25);
@@ -157,12 +159,13 @@ std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
   return masses;
 }
 
-// A contact adds to the proxy: a spring in the tool's space, and the directions N that friction holds.
+// A contact adds two things to the proxy: a spring in the tool's space, and the directions N in which friction holds
+// the proxy.
 struct Touch {
   Eigen::MatrixXd spring, forbidden;
 };
 
-// A basis orthogonal to n; n has two or three dimensions.
+// Returns a basis of the directions orthogonal to n. Precondition: n has two or three dimensions.
 Eigen::MatrixXd across(const Eigen::VectorXd& n) {
   Eigen::MatrixXd basis(n.size(), n.size() - 1);
   if (n.size() == 2) {
@@ -174,9 +177,11 @@ Eigen::MatrixXd across(const Eigen::VectorXd& n) {
   return basis;
 }
 
-// Free motion first, then the layers that the arm's tool can press on.
+// Returns free motion first, then the layers that the arm's tool can press on.
 std::vector<Touch> touches_of(const ElasticArm& arm, const LoopModel& loop) {
-  constexpr double least_share = 0.05;  // of a normal in the tool's space; below it, friction holds more than the layer
+  // Smallest length of a unit normal's part in the tool's space. Below it, friction would hold the tool more than the
+  // layer does.
+  constexpr double least_share = 0.05;
   const Eigen::Index d = arm.jacobian.rows();
   std::vector<Touch> touches{{Eigen::MatrixXd::Zero(d, d), Eigen::MatrixXd(d, 0)}};
   if (!loop.layers || arm.axes.cols() != d) return touches;
@@ -196,11 +201,13 @@ bool damps_gears(const LoopModel& loop) {
   return loop.gear_damping.damping_per_s > 0.0 && loop.gear_damping.joints != 0 && loop.arms;
 }
 
-// A horizon is chosen and judged with drives that lag, since lookahead compensates for lags.
+// The drives with which a loop is judged. A horizon is chosen and judged only with drives that lag, since lookahead
+// compensates for lags.
 enum class Drives { lag, both };
 
-// With torque-damped gears a loop must hold with each of these errors, too, since its stability rests on that
-// measurement. Soft gears come first: they require the most. Torques a fifth too small are less critical.
+// Returns the loops that must be stable: the given loop and, with torque-damped gears, this loop with each of the
+// errors of stability.hpp, since stability then rests on the torque measurement. Soft gears come first, because they
+// require the most mass.
 std::vector<LoopModel> with_torque_errors(const LoopModel& loop) {
   if (!damps_gears(loop)) return {loop};
   LoopModel soft = loop, late = loop;
@@ -216,7 +223,8 @@ LoopModel feeding_forward(LoopModel loop) {
   return loop;
 }
 
-// The loops in all poses, free and on all layers, with both kinds of drive: the cell doesn't say which it has.
+// The loops in all poses, in free motion and on all layers, with both kinds of drive, since the cell doesn't say which
+// kind it has.
 class ElasticLoops {
  public:
   ElasticLoops(const HandModel& hand, const LoopModel& loop, Drives drives = Drives::both)
@@ -239,7 +247,7 @@ class ElasticLoops {
     return largest;
   }
   // Returns the mass above which every mass up to max_mass_kg is stable. Most touches are stable at the mass that
-  // others require; these aren't searched.
+  // earlier touches require; these touches aren't searched.
   [[nodiscard]] std::optional<double> smallest_stable(double max_mass_kg) const {
     constexpr double least_kg = 1e-3, close_enough = 1.002;
     double smallest = 0.0;
@@ -268,7 +276,8 @@ class ElasticLoops {
                                 touch.forbidden);
   }
 
-  // Checks some masses from the smallest to the largest: a layer's unstable masses can lie above stable ones.
+  // Returns whether some masses from the smallest to the largest are stable, since a layer's unstable masses can lie
+  // above stable ones.
   template <class Holds>
   static bool holds_from(double smallest_kg, double largest_kg, const Holds& holds) {
     for (const double share : {0.0, 0.1, 0.25, 1.0}) {
@@ -281,7 +290,8 @@ class ElasticLoops {
   std::vector<Posed> loops_;
 };
 
-// K_v of the rigid loop, free and along each layer's stiffest direction, without duplicates.
+// Returns K_v of the rigid loop in free motion, and K_v plus the largest stiffness of each entry of `layers`, without
+// duplicates.
 std::vector<double> springs_of(const LoopModel& loop) {
   std::vector<double> springs{loop.spring_N_per_m};
   if (!loop.layers) return springs;
@@ -294,14 +304,16 @@ std::vector<double> springs_of(const LoopModel& loop) {
   return springs;
 }
 
-// Above this mass the gears don't matter, since the hand's mass is small compared to the proxy's. Besides, rounding
-// couldn't separate the slowest modes' eigenvalues from 1; a proxy has two close to it.
+// Above this proxy mass the loop is judged with a rigid arm. The gears don't matter there, since the hand's mass is
+// small compared to the proxy's. Besides, rounding couldn't separate the eigenvalues of the slowest modes from 1; a
+// proxy has two eigenvalues close to 1.
 constexpr double heaviest_on_gears_kg = 50.0;
 
-// A usual felt mass, between the lightest and the arm's own.
+// A usual felt mass, between the lightest felt mass and the arm's own mass.
 constexpr double usual_kg = 10.0;
 
-// For a rigid arm: searches from the top down to the first interval of unstable masses.
+// Returns the smallest stable mass with a rigid arm: searches from max_mass_kg down to the first interval of unstable
+// masses.
 std::optional<double> smallest_on_rigid(const Loop& loop, double max_mass_kg) {
   if (!(spectral_radius(loop, max_mass_kg) < 1.0)) return std::nullopt;
   double smallest = max_mass_kg;
@@ -315,7 +327,8 @@ std::optional<double> smallest_on_rigid(const Loop& loop, double max_mass_kg) {
   return smallest;
 }
 
-// The two methods of order 2 with events: its free motion, and (26) at events.
+// Returns the two loops of order 2 with events: order 2 in free motion, and order 1 for the steps in which contacts
+// change.
 std::pair<LoopModel, LoopModel> both_methods(const LoopModel& loop) {
   LoopModel free = loop, at_events = loop;
   free.with_events = false;
@@ -414,7 +427,7 @@ struct Held {
   LoopModel loop;
 };
 
-// One loop for each combination of pose, hand, delay and gear stiffness with which a horizon must be stable.
+// Returns one loop for each combination of pose, hand, delay and gear stiffness for which a horizon must be stable.
 std::vector<Held> held_in_all_ways(const HandModel& hand, const LoopModel& model, double proxy_mass_kg) {
   std::vector<LoopModel> poses;
   if (!model.arms) poses = {model};
@@ -468,7 +481,8 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
 }
 
 namespace {
-// Whether gears as stiff as gear_margins.back() come to rest under 10 and 50 kg, in a heavy hand, too.
+// Returns whether gears of gear_margins.back() times their stiffness come to rest under 10 and 50 kg, in the given hand
+// and in a heavy one.
 bool stiff_gears_hold(const HandModel& hand, LoopModel loop) {
   loop.gear_stiffness_ratio = gear_margins.back();
   HandModel heavy = hand;
@@ -487,7 +501,7 @@ double best_gear_damping_per_s(const HandModel& hand, const LoopModel& model) {
   loop.order = 1;
   loop.layers = nullptr;
   loop.gear_damping.damping_per_s = 0.0;
-  // Skips a κ that is unstable just below the smallest mass so far.
+  // A κ that is unstable at this share of the smallest mass so far is skipped.
   constexpr double lighter = 0.98;
   double best = 0.0, least_kg = smallest_stable_mass(hand, loop).value_or(heaviest_on_gears_kg);
   for (const double tried : tried_gear_dampings_per_s) {
@@ -511,10 +525,10 @@ LoopModel with_worst_layers(const HandModel& hand, const LoopModel& loop, double
   return with_layers(loop, {*by_radius[0].second, *by_radius[1].second});
 }
 
-// Just below the smallest stable mass, the touch that requires it is unstable. If no mass is stable, touches are tried
-// at heaviest_on_gears_kg. A layer's unstable masses can lie above stable ones.
+// Tries each layer just below the smallest stable mass: the layer that requires this mass is unstable there. If no mass
+// is stable, tries the layers at heaviest_on_gears_kg, since a layer's unstable masses can lie above stable ones.
 std::optional<LayerLimit> decisive_layer(const HandModel& hand, const LoopModel& loop) {
-  constexpr double more = 1.01;  // than the search's tolerance
+  constexpr double more = 1.01;  // a factor larger than the search's tolerance
   if (!loop.layers) return std::nullopt;
   const std::optional<double> smallest = smallest_stable_mass(hand, loop);
   const std::optional<double> without = smallest_stable_mass(hand, with_layers(loop, {}));
@@ -542,8 +556,8 @@ std::optional<DampedMass> least_damping(const LoopModel& loop, double most_kg,
 
 namespace {
 
-// Words of a check, for a mass or for an inertia about a point. `damping` scales tried_dampings: a hand damped by 20
-// Ns/m at 0.1 m turns with 0.2 Nms/rad.
+// Words of a check, for a mass or for an inertia about a point. `damping` scales tried_dampings: 20 Ns/m at a distance
+// of 0.1 m are 0.2 Nms/rad.
 struct Words {
   const char *option, *unit, *what, *damping_option;
   const char *stiffness_unit, *damping_unit;
@@ -552,10 +566,10 @@ struct Words {
 constexpr Words of_mass{"--mass", "kg", "mass", "--damping", "N/m", "Ns/m", 1.0};
 constexpr Words of_inertia{"--inertia", "kg m²", "inertia", "--turning-damping", "Nm/rad", "Nms/rad", 0.01};
 
-// A larger damping isn't advised for the sake of a light mass.
+// A damping above this isn't advised for the sake of a light mass.
 constexpr double honey_Ns_per_m = 50.0;
 
-// For example "--damping 20 Ns/m, with which 12 kg are stable"; empty if no tried damping suffices.
+// Returns for example "--damping 20 Ns/m, with which 12 kg are stable"; empty if no tried damping suffices.
 std::string damping_text(const HandModel& hand, const LoopModel& loop, double most_felt, double most_damping,
                          const Words& w) {
   const double handle = loop.handle_mass_kg;
@@ -586,7 +600,7 @@ void require_stable(double felt, const HandModel& hand, const LoopModel& loop, b
                            text(" (drives: %.3g ms)", 1e3 * loop.drive_time_constant_s);
   const auto smallest = smallest_stable_mass(hand, loop);
   if (!smallest) {
-    // For B + D_h ≤ K_h L no mass helps.
+    // If B + D_h ≤ K_h L, no mass is stable.
     const std::string some = damping_text(hand, loop, HUGE_VAL, HUGE_VAL, w);
     const std::string wanted = damping_text(hand, loop, felt, honey_Ns_per_m, w);
     const std::string add =

@@ -1,5 +1,6 @@
-// Displacement and rotation of a tool in one period, about its rendered point, in W: by the model of its links, and by
-// the motors (link_motion.hpp). Both at the time of the present force.
+// A tool's displacement and rotation in one period, about its rendered point, in W. There are two estimates
+// (link_motion.hpp): one by the model of the links, one by the motors. Both belong to the time at which the present
+// force was measured.
 #pragma once
 
 #include "models/geometry/tool_pose.hpp"

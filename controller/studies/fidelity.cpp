@@ -22,8 +22,9 @@ using Complex = std::complex<double>;
 
 constexpr std::array<double, 13> frequencies_Hz{0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0};
 
-// At low frequencies as much travel as a hand can make, at higher ones 5 cm/s for each sine. A light arm gets half: the
-// hand's force while the sensor is tared must be small for its drives.
+// Returns the sines of the hand's motion. At low frequencies their amplitude is as large as a hand's travel can be; at
+// higher ones it gives 5 cm/s for each sine. For a light arm the amplitudes are halved, so that the hand's force during
+// the tare is small enough for the arm's drives.
 std::vector<ArmSine> sines(bool wall, bool light) {
   std::vector<ArmSine> list;
   for (const double f : frequencies_Hz) {
@@ -33,7 +34,8 @@ std::vector<ArmSine> sines(bool wall, bool light) {
   return list;
 }
 
-// At low frequencies as much as a wrist can turn, at higher ones 0.1 rad/s for each sine.
+// Returns the sines of the hand's rotation. At low frequencies their amplitude is as large as a wrist can turn; at
+// higher ones it gives 0.1 rad/s for each sine.
 std::vector<ArmSine> turning_sines() {
   std::vector<ArmSine> list;
   for (const double f : frequencies_Hz) list.push_back({f, std::min(0.05, 0.1 / (2.0 * std::numbers::pi * f))});
@@ -42,8 +44,9 @@ std::vector<ArmSine> turning_sines() {
 
 std::vector<ArmSetup> setups(bool quick) {
   std::vector<ArmSetup> list;
-  // The start's transient decays with the time constant 2M/D. D = 13 Ns/m: the hand's 20 Ns/m less what the loop's
-  // delay takes away. Every mass gets 12 time constants, since a tenth of a newton matters at 0.1 Hz.
+  // The transient at the start decays with the time constant 2M/D, where D = 13 Ns/m is the hand's 20 Ns/m less what
+  // the loop's delay takes away. Each mass has 12 time constants to settle, because a tenth of a newton matters at 0.1
+  // Hz.
   const auto settling = [quick](double mass) { return std::max(quick ? 3.0 : 12.0, (quick ? 0.6 : 2.0) * mass); };
   const auto add = [&](double mass, double period, double drive, bool wall, bool looks_ahead = false,
                        const char* cell = "default", bool torque = false) {
@@ -62,7 +65,7 @@ std::vector<ArmSetup> setups(bool quick) {
   add(4.0, 1e-3, 1.0, true);
   add(10.0, 1e-3, 1.0, false);
   add(10.0, 1e-3, 1.0, false, true);
-  // Here too the time constant is 2J/D, below 2 s with the wrist's 0.5 Nms/rad.
+  // For a tool that turns, the time constant is 2J/D, which is below 2 s with the 0.5 Nms/rad of the hand's wrist.
   const auto turn = [&](double inertia, double period, double drive) {
     list.push_back({.inertia_kg_m2 = inertia,
                     .period_s = period,
@@ -84,7 +87,7 @@ std::vector<ArmSetup> setups(bool quick) {
   add(2.0, 1e-3, 1.0, false);
   add(20.0, 1e-3, 1.0, false);
   add(4.0, 2e-3, 1.0, false);
-  add(6.0, 4e-3, 1.0, false);  // 4 kg oscillate at this timestep
+  add(6.0, 4e-3, 1.0, false);  // 4 kg would oscillate at this timestep
   add(4.0, 2e-3, 1.0, true);
   add(4.0, 4e-3, 1.0, true);
   add(4.0, 1e-3, 0.5, false);
@@ -139,7 +142,7 @@ std::size_t Fidelity::jobs(const Options& options) const { return setups(options
 
 namespace {
 
-// One row per frequency, with NaN if a fault ended the session.
+// Adds one row per frequency, with NaN for the results if a fault ended the session.
 void add_rows(const ArmSetup& setup, const std::vector<ArmSample>& samples, std::vector<Row>& rows) {
   const auto wanted = static_cast<std::size_t>(std::lround(setup.duration_s / setup.period_s));
   const bool whole = samples.size() >= wanted, turning = setup.turns();
@@ -184,10 +187,10 @@ std::vector<Row> Fidelity::run(std::size_t job, const Options& options) const {
 
 namespace {
 
-// Figures by setup and frequency in Hz: in the worst direction, and in each direction.
+// Collects a quantity by setup and frequency: its value in the worst direction, and its value in each direction.
 class WorstOf {
  public:
-  // If a setup and frequency has several figures, the one furthest from `wanted` counts.
+  // Of the values of all directions, the one furthest from `wanted` is the worst.
   explicit WorstOf(double wanted) : wanted_(wanted) {}
   void add(const std::string& setup, const std::string& along, double frequency_Hz, double figure) {
     std::map<double, double>& worst = worst_[setup];

@@ -11,13 +11,13 @@
 namespace proxarm::studies {
 namespace {
 
-// The plots show the limit of 10 %, at the timestep of most sessions.
+// The plots show the limit of 10 %, and sessions with the timestep that most sessions have.
 constexpr double asked_limit = 0.1, drawn_period_s = 1e-3;
 
-// A drawn setup and its errors by frequency, in the direction where each is largest.
+// A drawn setup, and at each frequency the largest error of all directions.
 struct Drawn {
-  std::string name{};  // in the key
-  double mass = 0.0;   // or inertia
+  std::string name{};  // name in the key
+  double mass = 0.0;   // for a tool that turns: the inertia
   bool looks_ahead = false, torque = false;
   std::map<double, double> error_of_Hz{};
 };
@@ -26,7 +26,7 @@ bool flag(const Table& table, std::size_t row, const char* name) {
   return table.number(row, table.column(name)) != 0.0;
 }
 
-// The default cell with its own drives, at the drawn timestep.
+// Returns whether a row is of the default cell with unchanged drives, at the drawn timestep.
 bool is_usual(const Table& table, std::size_t row) {
   return table.text(row, table.column("cell")) == "default" && table.number(row, table.column("drive_factor")) == 1.0 &&
          table.number(row, table.column("period_s")) == drawn_period_s;
@@ -39,7 +39,7 @@ Way way_of(const Table& table, std::size_t row) {
   return flag(table, row, "wall") ? Way::wall : Way::free;
 }
 
-// All usual setups of one kind, in the order of mass, lookahead, torque.
+// Returns all usual setups of one kind of motion, in the order of mass, lookahead, torque.
 std::vector<Drawn> usual_setups(const Table& table, Way way) {
   const std::size_t error = table.column(way == Way::turning ? "inertia_error" : "mass_error"),
                     mass = table.column(way == Way::turning ? "inertia_kg_m2" : "mass_kg"),
@@ -66,7 +66,8 @@ std::vector<Drawn> usual_setups(const Table& table, Way way) {
   return list;
 }
 
-// The mass with the most measured variants of lookahead and torque; the heaviest of several.
+// Returns the setups of one mass: the mass with most measured variants of lookahead and torque, and of several such
+// masses the largest.
 std::vector<Drawn> one_mass(const Table& table) {
   std::vector<Drawn> list = usual_setups(table, Way::free);
   std::map<double, int> count;
@@ -81,14 +82,14 @@ std::vector<Drawn> one_mass(const Table& table) {
 
 std::string timestep_text() { return "At T = " + number_text(1e3 * drawn_period_s, 3) + " ms "; }
 
-// The setup with the lowest band.
+// Returns the setup whose band ends at the lowest frequency.
 const Drawn& least_of(const std::vector<Drawn>& setups) {
   return *std::ranges::min_element(setups, {},
                                    [](const Drawn& drawn) { return band_Hz(drawn.error_of_Hz, asked_limit); });
 }
 
-// The errors in per cent, with the limits. A ring marks where 10 % are passed: for each setup, or for the first inertia
-// to pass.
+// Returns a panel with the errors in per cent and the limits. A ring marks the point at which an error passes 10 %: for
+// each setup, or, with `turning`, only for the inertia whose error passes 10 % at the lowest frequency.
 Panel error_panel(const std::vector<Drawn>& setups, bool turning) {
   Panel panel{.title = std::string("Error of the ") + (turning ? "inertia" : "mass") + " felt, " +
                        (turning ? "about the worst axis" : "in the worst direction"),

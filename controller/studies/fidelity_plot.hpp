@@ -1,4 +1,4 @@
-// The fidelity study's plots, and their titles, which state the result.
+// Draws the fidelity study's plots, and makes their titles, which state the result.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,9 @@
 
 namespace proxarm::studies {
 
-// The frequencies up to which the drawn setups feel right within 10 % in the worst direction: one mass plain, with
-// lookahead and with measured torque; and all inertias of a tool that turns.
+// The titles state up to which frequency the drawn setups feel right within 10 % in the worst direction. The first
+// title is about one mass without additions, with lookahead and with measured torque; the second title is about all
+// inertias of a tool that turns.
 std::string fidelity_answer(const Table& table);
 std::string fidelity_turning_answer(const Table& table);
 

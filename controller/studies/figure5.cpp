@@ -22,14 +22,14 @@ using nlohmann::json;
 using Vec2 = Vec<2>;
 
 struct Law {
-  const char *name, *title;  // the paper's number; the title in the picture
+  const char *name, *title;  // the paper's number of the equation; the title in the picture
   ImpedanceLaw law;
 };
 constexpr std::array<Law, 3> laws{{{"1", "spring alone", ImpedanceLaw::plain},
                                    {"5", "spring and damper", ImpedanceLaw::damped_motion},
                                    {"23", "implicit, default", ImpedanceLaw::implicit}}};
 
-// Smaller forces count as 0.
+// A smaller force counts as 0.
 constexpr double nothing_N = 1e-3;
 
 constexpr double above_m = 0.015, below_m = -0.020, rub_m = 0.03;
@@ -41,7 +41,7 @@ double minimum_jerk(double s) {
   return s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
 }
 
-// The hand presses, rubs to and fro twice, and leaves.
+// Returns the hand's intended position: the hand presses, rubs to and fro twice, and leaves.
 Vec2 intention(double t) {
   const double down = minimum_jerk((t - press_from_s) / (press_to_s - press_from_s));
   const double up = minimum_jerk((t - leave_from_s) / (leave_to_s - leave_from_s));
@@ -76,7 +76,7 @@ std::vector<Row> Figure5::run(std::size_t job, const Options& /*options*/) const
   const double smoothing = 1.0 - std::exp(-2.0 * std::numbers::pi * setup.filter_Hz * T);
   std::vector<Row> rows;
   const auto steps = static_cast<int>(std::lround(setup.duration_s / T));
-  constexpr int finer = 50;  // steps of the mechanics in a period
+  constexpr int finer = 50;  // steps in which the device's motion is integrated over a period
   for (int k = 0; k < steps; ++k) {
     measured += smoothing * (x - measured);
     if (proxy.step(measured) != controller::ProxyFault::none) break;
@@ -108,7 +108,7 @@ json Figure5::headline(const Table& table, const Options& /*options*/) const {
       most_pull = std::max(most_pull, -f_y);
       most_kick = std::max(most_kick, std::abs(f_x) - setup.friction * f_y);
       if (touch_s < 0.0 && f_y > 0.0) touch_s = t;
-      // From well after the touch until the rubbing the hand rests, and so should the force.
+      // From well after the touch until the rubbing begins the hand rests, and the force should be steady.
       if (t < press_to_s + 0.3 || t > rub_from_s - 0.05) continue;
       low = any ? std::min(low, f_y) : f_y;
       high = any ? std::max(high, f_y) : f_y;
@@ -139,7 +139,7 @@ json Figure5::headline(const Table& table, const Options& /*options*/) const {
 
 namespace {
 
-// A row of the picture: one signal for each law.
+// A row of the picture, which shows one signal for each law.
 struct Signal {
   const char *column, *label;
   double factor, low, high, tick;
@@ -151,7 +151,8 @@ constexpr std::array<Signal, 5> signals{{{"tool_x_m", "p_x (mm)", 1e3, -40, 40, 
                                          {"force_y_N", "f_y (N)", 1.0, -2, 16, 5},
                                          {"force_y_N", "f_y (N)", 1.0, -0.7, 0.7, 0.5, 4.1, 4.7}}};
 
-// One law's signal over time. Leaves out points that couldn't be distinguished at half the size.
+// Returns a signal over time for one law. Points that couldn't be told apart even at half the picture's size are left
+// out.
 Curve curve_of(const Table& table, const Law& law, const Signal& signal) {
   const std::size_t of = table.column("law"), time = table.column("time_s"), column = table.column(signal.column);
   Curve curve;
@@ -168,7 +169,7 @@ Curve curve_of(const Table& table, const Law& law, const Signal& signal) {
   return curve;
 }
 
-// Marks the least force while the tool leaves the wall; below 0 the wall pulls.
+// Returns a note at the least force while the tool leaves the wall. If that force is below 0, the wall pulls.
 Note pull_note(const Curve& f_y) {
   const auto least = std::ranges::min_element(f_y.y);
   if (least == f_y.y.end()) return {};
@@ -177,7 +178,7 @@ Note pull_note(const Curve& f_y) {
   return {t, *least, "pull " + number_text(-*least, 3) + " N", Note::Side::right};
 }
 
-// States by how much the force swings while the hand rests.
+// Returns a note that states by how much the force swings while the hand rests.
 Note swing_note(double oscillation_N, const Curve& f_y) {
   const double t = 0.5 * (press_to_s + 0.3 + rub_from_s);
   if (oscillation_N < nothing_N) return {t + 0.4, 6.0, "steady", Note::Side::on, false};

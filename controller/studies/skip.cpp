@@ -26,14 +26,15 @@ using scenes::Scene;
 using Clock = std::chrono::steady_clock;
 
 constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
-constexpr double coupling_N_per_m = 1e6;  // 1 kg at 1 ms
+constexpr double coupling_N_per_m = 1e6;  // K = M/T² for 1 kg and 1 ms
 
 double elapsed_ns(Clock::time_point begun) {
   return std::chrono::duration<double, std::nano>(Clock::now() - begun).count();
 }
 
-// The time of a step along a small circle around `at`, with `push` in each step: the best of forty rounds, which are so
-// short that most run undisturbed even on a busy machine. NaN if the push meets no object.
+// Returns the time of a step while the proxy moves along a small circle around `at`, with `push` in each step; NaN if
+// the push meets no object. The best of forty rounds counts. The rounds are so short that most of them run undisturbed
+// even on a busy machine.
 double step_ns(models::GeometricAlgorithm<3>& g, const Vec3& at, const Vec3& push, int steps) {
   double best = std::numeric_limits<double>::infinity();
   for (int round = 0; round < 40; ++round) {
@@ -46,15 +47,15 @@ double step_ns(models::GeometricAlgorithm<3>& g, const Vec3& at, const Vec3& pus
       q = g(coupling_N_per_m, q + ahead + push, q);
     }
     best = std::min(best, elapsed_ns(begun) / steps);
-    // In free space the push moves the proxy 5 µm further down in each step.
+    // If the push meets no object, the proxy falls by push.z in each step.
     const bool fell = push.z() < 0.0 && at.z() - q.z() > 0.5 * steps * std::abs(push.z());
     if (!q.allFinite() || fell) return not_measured;
   }
   return best;
 }
 
-// `count` spheres on a grid of 1 m around the origin, with a radius of 0.4 of their distance; the first one is at the
-// origin.
+// Returns a world of `count` spheres on a grid of 1 m around the origin. Their radius is 0.4 of the distance between
+// neighbours, and the first sphere is at the origin.
 Scene spheres(std::size_t count) {
   Scene scene;
   const auto side = static_cast<int>(std::ceil(std::cbrt(static_cast<double>(count))));
@@ -70,7 +71,8 @@ Scene spheres(std::size_t count) {
   return scene;
 }
 
-// A sphere of 0.2 m as a mesh of about `count` triangles. Its poles, vertices of many triangles, lie along x.
+// Returns a world with a sphere of 0.2 m as a mesh of about `count` triangles. The sphere's poles, which are vertices
+// of many triangles, lie on the x axis.
 Scene globe(std::size_t count) {
   const auto rings = static_cast<std::uint32_t>(std::max(2.0, std::sqrt(static_cast<double>(count) / 4.0)));
   Scene scene;
@@ -83,7 +85,7 @@ Scene globe(std::size_t count) {
   return scene;
 }
 
-// The time to compute the distance of every object: the least that a step costs if it skips none.
+// Returns the time to compute the distance from every object, which is the least time of a step that skips no object.
 double all_ns(const Scene& scene, const Vec3& at) {
   double best = std::numeric_limits<double>::infinity();
   if (const auto* mesh = std::get_if<scenes::MeshShape>(&scene.objects.front().shape)) {
@@ -110,7 +112,7 @@ struct OptionScene {
   Scene scene;
 };
 
-// A wall, and the same wall with one more option each.
+// Returns a scene with a wall, and for each option a scene with the wall and that option.
 std::vector<OptionScene> option_scenes() {
   const auto wall = [](double friction) {
     Scene scene;
@@ -181,7 +183,7 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   std::string kind = "option", name;
   Scene scene;
   double count = 0.0;
-  Vec3 surface = Vec3::Zero();  // a point on an object, seen from above
+  Vec3 surface = Vec3::Zero();  // the top of an object
   if (job < objects.size()) {
     kind = name = "objects";
     scene = spheres(objects[job]);
@@ -207,7 +209,7 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   const double gap = count > 1.0 && kind == "objects" ? 0.05 * surface.z() : 1e-3;
   const double far = step_ns(g, Vec3(0.3, 0.2, 20.0), none, steps);
   const double near = step_ns(g, surface + Vec3(0.0, 0.0, gap), none, steps);
-  // Searched from above, since a coarse mesh lies below its sphere.
+  // The surface is found from above, because a coarse mesh lies inside the sphere that it approximates.
   const double depth = std::max(0.5 * surface.z(), 1e-3);
   const Vec3 down =
       empty ? surface : g(coupling_N_per_m, surface - depth * Vec3::UnitZ(), surface + 1e-3 * Vec3::UnitZ());
@@ -272,7 +274,7 @@ json Skip::headline(const Table& table, const Options& /*options*/) const {
 
 namespace {
 
-// Costs of a kind of world, by number of objects or triangles.
+// Times of a step in one world of a kind. A map has them by number of objects or triangles.
 struct Cost {
   double free_ns = 0.0, contact_ns = 0.0, all_ns = 0.0;
 };
@@ -325,7 +327,7 @@ Panel cost_panel(const CostByCount& costs, const char* title, const char* what) 
   return panel;
 }
 
-// Whether steps in the largest world take less than twice as long as in the smallest.
+// Returns whether a step in the largest world takes less than twice as long as a step in the smallest world.
 bool hardly_grows(const CostByCount& costs) {
   if (costs.empty()) return true;
   const Cost &small = costs.begin()->second, &large = costs.rbegin()->second;

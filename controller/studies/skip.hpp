@@ -1,9 +1,10 @@
-// Measures the cost of a step and of start-up against the size of a world: distant objects must cost nothing.
+// Measures how the time of a step and of start-up grows with the size of a world. Distant objects must cost nothing.
 //
-// The worlds have one to thousands of spheres on a grid, or meshes of up to a hundred thousand triangles. The proxy is
-// far from all objects, near one, or slides on one; evaluating every object in every step is the comparison. The study
-// also measures each option of a scene; unused options cost nothing, since 𝒢 is compiled without them. For whole cycles
-// it counts what they compute around 𝒢 and how often they skip it. The caller provides the cycles.
+// A world has one to thousands of spheres on a grid, or a mesh of up to a hundred thousand triangles. The proxy is far
+// from all objects, near one object, or slides on one. For comparison, the study measures the time to evaluate every
+// object. It also measures the cost of each option of a scene. An unused option costs nothing, because 𝒢 is compiled
+// without it. For whole cycles, the study counts the computations besides 𝒢, and how often they are skipped. The caller
+// provides the function that runs cycles.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +15,13 @@
 
 namespace proxarm::studies {
 
-// A session of the simulated arm. Files are named as in the source tree; empty: the default ones.
+// A session of the simulated arm. Files are named by their paths in the source tree; empty: the default file.
 struct CycleSetup {
   const char* name = "";
   const char *cell = "", *scene = "", *hand = "";
   bool looks_ahead = false;  // --lookahead auto
 };
-// Counts over the session's rendering steps, explained in controller/motion/motion_work.hpp.
+// Counts over the session's rendering steps. controller/motion/motion_work.hpp explains them.
 struct CycleCounts {
   std::uint64_t steps = 0, programs = 0, limited = 0, joint_steps = 0, guarded = 0;
 };
@@ -43,7 +44,7 @@ class Skip final : public Study {
   CycleRun cycles_;
 };
 
-// The plot's title: the time of a step in the largest worlds, and whether their size matters.
+// Returns the plot's title: the time of a step in the largest worlds, and whether the worlds' size matters.
 std::string skip_answer(const Table& table);
 
 }  // namespace proxarm::studies

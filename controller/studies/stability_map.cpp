@@ -27,8 +27,8 @@ using Vec1 = Vec<1>;
 
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
-// Simulates drive, delay and hand of controller/stability/stability.hpp, from the proxy's position to the force that
-// the sensor reads at the next step.
+// Simulates the drive, the delay and the hand of controller/stability/stability.hpp: computes from the proxy's position
+// the force that the sensor reads at the next step.
 class LinearPlant {
  public:
   LinearPlant(const HandModel& hand, const LoopModel& loop, double intention_m, double start_m)
@@ -45,14 +45,14 @@ class LinearPlant {
     grip_.assign(static_cast<std::size_t>(whole) + 2, K_ * (start_m - intention_m));
   }
 
-  // Takes the proxy's q(k); returns h(k + 1).
+  // Returns h(k + 1) for the proxy's q(k).
   double operator()(double q) noexcept {
     p2_ = p1_;
     p1_ = p_;
     p_ = (1.0 - beta_) * q + beta_ * p_;
     const double grip = K_ * (p_ - intention_) + D_ * (p_ - p1_) + m_ * (p_ - 2.0 * p1_ + p2_);
     grip_[next_] = grip;
-    // The oldest sample and the next one.
+    // The delay lies between the oldest sample and the sample after it.
     const std::size_t oldest = next_ + 1 == grip_.size() ? 0 : next_ + 1;
     const std::size_t younger = oldest + 1 == grip_.size() ? 0 : oldest + 1;
     next_ = oldest;
@@ -76,17 +76,18 @@ controller::AdmittanceConfig config(const LoopModel& loop, double mass_kg) {
   return config;
 }
 
-// Rates returned if a run tells only the sign.
+// The rates that are returned if a run shows only the rate's sign.
 constexpr double blew_up = 1e3, died = -1e3;
 
-// ln r of the recorded motion from the share `from` on: half the least-squares slope of ln(q(k)² − q(k+s) q(k−s)).
+// Returns ln r of the recorded motion, without the first share `from` of it: half the least-squares slope of ln(q(k)² −
+// q(k+s) q(k−s)).
 double slope(const std::vector<double>& q, double from) {
   const auto begin = static_cast<std::size_t>(from * static_cast<double>(q.size()));
   int crossings = 0;
   for (std::size_t k = begin + 1; k < q.size(); ++k) crossings += (q[k] < 0.0) != (q[k - 1] < 0.0) ? 1 : 0;
   const double theta = std::numbers::pi * crossings / static_cast<double>(q.size() - begin - 1);
-  // sin(sθ) must not vanish: near the Nyquist frequency (θ = π) that takes a shift s of several steps. At the Nyquist
-  // frequency itself no s exists, and |q| is used.
+  // sin(sθ) must not vanish, so near the Nyquist frequency (θ = π) the shift s must be several steps. At the Nyquist
+  // frequency itself no such s exists, and |q| is used instead.
   std::size_t s = 0;
   const auto most = std::min<std::size_t>((q.size() - begin) / 4, 20'000);
   for (std::size_t i = 1; i <= most && s == 0; ++i) {
@@ -110,22 +111,22 @@ double slope(const std::vector<double>& q, double from) {
 
 // Measures the rate ln|z| per step at which the slowest mode grows (positive: unstable) or decays.
 //
-// Once a single mode A rᵏ cos(kθ + φ) is left, q(k)² − q(k+s) q(k−s) = A² r²ᵏ sin²(sθ) at any phase, so its logarithm
-// is a straight line over k with slope ln r². The simulation doubles its length until the slope of the last quarter
-// equals that of the second half within `share`, and the motion has grown or decayed by e⁸. By then a mode of the
-// opposite trend would show even if it started 3000 times smaller.
+// When a single mode A rᵏ cos(kθ + φ) is left, q(k)² − q(k+s) q(k−s) = A² r²ᵏ sin²(sθ) for any φ. So the logarithm of
+// this expression is a straight line over k with slope ln r². The simulation doubles its length until the slope of the
+// last quarter equals the slope of the second half within `share`, and the motion has grown or decayed by e⁸. By then a
+// mode whose rate has the opposite sign would show, even if that mode started 3000 times smaller.
 double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
   constexpr double start = 1e-3, share = 0.005, folds = 8.0;
   constexpr int most_steps = 100'000;
   models::FreeSpace<1> nothing;
   AdmittanceProxy<1> proxy(config(loop, mass_kg), nothing);
-  // The hand's target is 0; the proxy is released from rest at a distance.
+  // The hand's target is 0, and the proxy is released from rest at the distance `start` from it.
   proxy.start({.q = Vec1(start)});
   static_cast<void>(proxy.set_reference(Vec1::Zero()));
   LinearPlant plant(hand, loop, 0.0, start);
   double h = plant.first_force();
-  // A release from rest hardly excites modes near the Nyquist frequency. A force that moves the proxy aside by the same
-  // distance for one step excites all modes alike.
+  // A release from rest hardly excites modes near the Nyquist frequency. A force that moves the proxy by the distance
+  // `start` for one step excites all modes alike.
   const double aside = mass_kg / (loop.period_s * loop.period_s) * start;
   const std::array<double, 3> kick{aside, -2.0 * aside, aside};
   std::vector<double> q{start};
@@ -153,12 +154,12 @@ double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
 }
 
 struct Contact {
-  double bounces = 0.0;      // number of touches in the last third
-  double amplitude_m = 0.0;  // of the proxy in the last third, peak to peak
-  double growth = 0.0;       // ratio to the amplitude in the third before; 0 if it settles
+  double bounces = 0.0;      // number of touches in the last third of the run
+  double amplitude_m = 0.0;  // of the proxy in the last third of the run, peak to peak
+  double growth = 0.0;       // amplitude_m over the amplitude in the second third; 0 if the proxy settles
 };
 
-// The hand's target is 20 mm behind a wall that is 10 mm away.
+// Simulates a hand that pushes the proxy against a wall 10 mm away. The hand's target is 20 mm behind the wall.
 Contact push_against_wall(const HandModel& hand, const LoopModel& loop, double mass_kg) {
   constexpr double start = 0.01, intention = -0.02;
   models::Plane<1> wall(Vec1(0.0), Vec1(1.0));
@@ -168,7 +169,7 @@ Contact push_against_wall(const HandModel& hand, const LoopModel& loop, double m
   double h = 0.0;
   const int steps = static_cast<int>(std::min(20'000.0, 3.0 / loop.period_s));
   Contact contact;
-  std::array<double, 2> low{start, start}, high{-start, -start};  // of the last two thirds
+  std::array<double, 2> low{start, start}, high{-start, -start};  // of the proxy in the last two thirds of the run
   bool touched = false;
   for (int k = 0; k < steps; ++k) {
     if (proxy.step(Vec1(h)) != controller::ProxyFault::none) return {contact.bounces, blew_up, blew_up};
@@ -188,11 +189,11 @@ Contact push_against_wall(const HandModel& hand, const LoopModel& loop, double m
   return contact;
 }
 
-// Masses tried at walls, as multiples of the smallest stable mass.
+// The masses that are tried at walls, as multiples of the smallest stable mass.
 constexpr std::array<double, 8> wall_multiples{1.02, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 2.0};
 
-// The least multiple of the smallest mass from which on bouncing at the wall doesn't grow, with it and with all larger
-// ones tried. Infinite if it grows with the largest.
+// Returns the smallest of the tried multiples of the smallest mass with which, and with all larger ones, bouncing at
+// the wall doesn't grow. Returns infinity if bouncing grows with the largest multiple.
 double bears_walls_from(const HandModel& hand, const LoopModel& loop, double smallest_kg) {
   double from = std::numeric_limits<double>::infinity();
   for (std::size_t i = wall_multiples.size(); i-- > 0;) {
@@ -229,7 +230,8 @@ struct Grid {
   }
 };
 
-// The largest relative error of the smallest stable mass from eigenvalues, against its closed form for L = 0.
+// Returns the largest relative difference between the smallest stable mass from eigenvalues and the mass from the
+// closed form for L = 0.
 double d1_error() {
   double worst = 0.0;
   for (const double T : decades(1e-4, 1e-2, 9)) {
@@ -249,7 +251,7 @@ double d1_error() {
 }  // namespace
 
 double measured_boundary_kg(const HandModel& hand, const LoopModel& loop, double guess_kg) {
-  // A bracket: unstable below, stable above.
+  // Brackets the boundary: the loop is unstable at `low` and stable at `high`.
   double low = guess_kg / 1.03, high = guess_kg * 1.03;
   double at_low = growth(hand, loop, low), at_high = growth(hand, loop, high);
   for (int i = 0; i < 24 && !(at_low > 0.0); ++i) {
@@ -265,7 +267,7 @@ double measured_boundary_kg(const HandModel& hand, const LoopModel& loop, double
     at_high = growth(hand, loop, high);
   }
   if (!(at_low > 0.0 && at_high < 0.0)) return nan_value;
-  // Bisection instead of regula falsi, because the rate has a kink where another mode becomes the slowest.
+  // Uses bisection instead of regula falsi, because the rate has a kink where another mode becomes the slowest mode.
   for (int i = 0; i < 7; ++i) {
     const double middle = std::sqrt(low * high);
     (growth(hand, loop, middle) > 0.0 ? low : high) = middle;
@@ -281,7 +283,7 @@ std::vector<Column> StabilityMap::columns() const {
           {"at_walls_kg"},  {"contact_growth"},    {"bears_walls_from"}};
 }
 
-// A job computes all stiffnesses of one line, so that jobs aren't too small.
+// A job computes all stiffnesses of the hand with the other quantities constant, so that jobs aren't too small.
 std::size_t StabilityMap::jobs(const Options& options) const {
   const Grid grid(options.quick);
   return grid.size() / grid.K.size();
@@ -317,8 +319,9 @@ std::vector<Row> StabilityMap::run(std::size_t job, const Options& options) cons
       stiffer.stiffness_N_per_m *= 1.01;
       const auto other = controller::smallest_stable_mass(stiffer, loop);
       sensitivity = other ? std::abs(std::log(*other / *predicted)) / std::log(1.01) : 1e3;
-      // The guess is off by up to 2.7 %, differently at each point. If it were the prediction itself, a correct
-      // prediction would always end at the same place of the bisection's last interval.
+      // The guess differs from the prediction by up to 2.7 %, by another factor at each point. If the guess were the
+      // prediction itself, a correct prediction would be at the same place in the bisection's last interval at every
+      // point.
       const double share = std::fmod(static_cast<double>(job * grid.K.size() + i) * 0.6180339887498949, 1.0);
       measured = measured_boundary_kg(hand, loop, *predicted * std::pow(1.03, 1.8 * (share - 0.5)));
       if ((job + i) % 10 == 0 && predicted_at_walls) {
@@ -326,7 +329,8 @@ std::vector<Row> StabilityMap::run(std::size_t job, const Options& options) cons
         bears_from = bears_walls_from(hand, loop, *predicted_at_walls);
       }
     } else {
-      // Compares measured and predicted rate at a mass that oscillates with a period of some hundred steps.
+      // Compares the signs of the measured and the predicted rate at a mass that oscillates with a period of some
+      // hundred steps.
       const double mass = std::clamp(hand.stiffness_N_per_m * std::pow(40.0 * loop.period_s, 2), 1e-2, 1000.0);
       const bool grows = growth(hand, loop, mass) > 0.0;
       measured = grows == (controller::spectral_radius(hand, loop, mass) > 1.0) ? -1.0 : 0.0;

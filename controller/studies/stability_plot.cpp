@@ -13,10 +13,10 @@
 namespace proxarm::studies {
 namespace {
 
-// The drawn part of the map: (26) with drives of 100 Hz.
+// The drawn part of the map is that of (26) with drives of 100 Hz.
 constexpr double drawn_order = 1.0, drawn_drive_s = 1.6e-3;
 
-// The drawn grip of the handle.
+// The mass and the damping of the hand in the drawn part.
 constexpr double hand_kg = 1.0, hand_Ns_per_m = 20.0;
 
 class Points {
@@ -52,10 +52,10 @@ class Points {
   std::size_t order_, drive_, delay_, mass_, damping_;
 };
 
-// The mass that is enough for a hand up to some stiffness, at one timestep and delay.
+// A mass that is stable with hands up to a stiffness, up_to_N_per_m, at one timestep and delay.
 struct Enough {
   double period_s = 0.0, delay_s = 0.0, mass_kg = 0.0, up_to_N_per_m = 0.0;
-  bool all = true;  // true: enough for all stiffnesses that were tried
+  bool all = true;  // true: some mass is stable with every stiffness that was tried
 };
 
 Enough enough_of(const Table& table, double delay_s) {
@@ -64,7 +64,7 @@ Enough enough_of(const Table& table, double delay_s) {
   for (const double T : points.grid("period_s")) {
     if (std::abs(T - 1e-3) < std::abs(found.period_s - 1e-3)) found.period_s = T;
   }
-  std::map<double, double> smallest_kg;  // by the hand's stiffness; negative: no stable mass
+  std::map<double, double> smallest_kg;  // for each stiffness of the hand; negative: no mass is stable
   for (std::size_t row = 0; row < table.rows(); ++row) {
     if (!points.is_drawn(row, found.delay_s) || points.value(row, "period_s") != found.period_s) continue;
     smallest_kg[points.value(row, "stiffness_N_per_m")] = points.value(row, "predicted_kg");
@@ -88,7 +88,7 @@ std::string milliseconds(double s) { return number_text(1e3 * s, 2) + " ms"; }
 
 std::string delay_text(double delay_s) { return delay_s > 0.0 ? "T + " + milliseconds(delay_s) : "T alone"; }
 
-// At most three delays, with the shortest and the longest.
+// Returns at most three delays, among them the shortest and the longest.
 std::vector<double> drawn_delays(const Points& points) {
   const std::vector<double> all = points.grid("delay_s");
   if (all.size() <= 3) return all;
@@ -144,7 +144,7 @@ struct Compared {
   double sensitivity, error;
 };
 
-// Relative difference between measured and predicted mass that a test permits.
+// The relative difference between measured and predicted mass that a test permits.
 constexpr double tolerance = 0.02;
 
 struct Agreement {
@@ -169,12 +169,13 @@ Agreement agreement_of(const Table& table) {
   return all;
 }
 
-// One of this many points is drawn.
+// Returns n if one of n points is to be drawn.
 std::size_t thinning(std::size_t points) { return points / 2500 + 1; }
 
 Chart agreement_chart(const Table& table) {
   const Agreement all = agreement_of(table);
-  constexpr double least_x = 1e-4, most_x = 9.0, least_y = 2e-7;  // points beyond are drawn at these borders
+  // Points beyond these borders are drawn at the borders.
+  constexpr double least_x = 1e-4, most_x = 9.0, least_y = 2e-7;
   const auto thin = thinning(all.good.size());
   const auto dots = [&](const std::vector<Compared>& list, const std::string& name, int style, std::size_t each) {
     Curve curve{.name = name, .style = style, .marks = true, .line = false, .mark_size = 0.4};

@@ -1,4 +1,4 @@
-// The stability map's plots, and their titles, which state the result.
+// Draws the stability map's plots, and makes their titles, which state the result.
 #pragma once
 
 #include <filesystem>
@@ -9,14 +9,15 @@
 
 namespace proxarm::studies {
 
-// Measured and predicted mass are compared only below this sensitivity of the boundary.
+// Measured and predicted mass are compared only where the boundary's sensitivity is below this value.
 inline constexpr double well_conditioned = 3.0;
 
-// For each drawn delay the hand's stiffness up to which some mass is stable, with a hand of 1 kg and 20 Ns/m at the
-// timestep nearest to 1 ms.
+// Returns the map's title: for each drawn delay, up to which stiffness of the hand which mass is enough, with a hand of
+// 1 kg and 20 Ns/m at the timestep nearest to 1 ms.
 std::string stability_answer(const Table& table);
 
-// The largest difference between measured and predicted smallest mass, and the number of points.
+// Returns the title of the comparison: the largest difference between the measured and the predicted smallest mass, and
+// the number of points.
 std::string agreement_answer(const Table& table);
 
 // Writes stability.svg and stability_agreement.svg. Returns warnings.

@@ -13,10 +13,10 @@ namespace proxarm::studies {
 
 using StudyList = std::vector<std::unique_ptr<Study>>;
 
-// `arm` and `cycles` run the simulated arm for the studies that need it.
+// Returns all studies. `arm` and `cycles` are the functions that run the simulated arm for the studies that need it.
 StudyList all_studies(const ArmRun& arm, const CycleRun& cycles);
 
-// Throws description::SetupError that lists the studies.
+// Returns the study of this name. If there is none, throws a description::SetupError that lists the studies.
 const Study& study_named(const StudyList& list, const std::string& name);
 
 }  // namespace proxarm::studies

@@ -24,7 +24,7 @@ using description::Cell;
 using description::in_quotes;
 using description::SetupError;
 
-// A mistake in the cell's file, which has already been read: looks the key's line up again.
+// Returns an error in the cell's file, which has already been read. Reads the file again to find the line of the key.
 SetupError in_cell(const Cell& cell, const std::string& list, std::size_t index, const std::string& key,
                    std::string found, std::string expected, std::string advice = {}) {
   const bool element = list == "drives";
@@ -33,7 +33,7 @@ SetupError in_cell(const Cell& cell, const std::string& list, std::size_t index,
     const auto node = element ? description::drive_nodes(root).at(index) : root.map(list);
     const SetupError mistake = node.error_at(key, expected, found, advice);
     return element ? description::of_drive(node, mistake) : mistake;
-  } catch (const std::exception&) {  // the cell was never in a file
+  } catch (const std::exception&) {  // the cell doesn't come from a file
     const std::string place = element ? list + "[" + std::to_string(index) + "]" : list;
     return SetupError({.file = cell.file.string(),
                        .key = place + "." + key,
@@ -52,7 +52,7 @@ bool is_axis(const UrdfJoint& joint) {
   return joint.type == "revolute" || joint.type == "continuous" || joint.type == "prismatic";
 }
 
-// Checks that each drive has a joint and each moving joint a drive.
+// Checks that each drive has a joint, and each moving joint has a drive.
 void check_joints(const Cell& cell, const Urdf& urdf) {
   std::vector<std::string> names;
   for (const UrdfJoint& joint : urdf.joints) {
@@ -117,7 +117,7 @@ Pose pose(const double* position, const double* quaternion) {
   return X;
 }
 
-// A rotation whose z axis is `axis`; exact if that is x, y or z, as it usually is.
+// Returns a rotation whose z axis is `axis`. The result is exact if `axis` is x, y or z, which is usual.
 Pose turn_z_to(const Vec3& axis) {
   Eigen::Index least = 0;
   axis.cwiseAbs().minCoeff(&least);
@@ -166,7 +166,8 @@ Arm::Arm(const Cell& cell) : file_(cell.file.string()) {
   read_chain(cell);
 }
 
-// MuJoCo's bodies as links of the chain. A body without a joint of the chain belongs to the last link before it.
+// MuJoCo's bodies, assigned to the links of the chain. A body without a joint of the chain belongs to the last link
+// before it.
 struct Arm::Bodies {
   Bodies(const mjModel& m, const std::string& sensor_link) : model(m) {
     for (int body = mj_name2id(&m, mjOBJ_BODY, sensor_link.c_str()); body > 0; body = m.body_parentid[body]) {
@@ -175,9 +176,9 @@ struct Arm::Bodies {
   }
 
   const mjModel& model;
-  std::vector<int> path;  // from the world to the sensor's link
+  std::vector<int> path;  // bodies from the world to the sensor's link
   std::vector<int> link = std::vector<int>(static_cast<std::size_t>(model.nbody), -1);
-  std::vector<Pose> X_link = std::vector<Pose>(link.size(), Pose::Identity());  // pose of the body in its link
+  std::vector<Pose> X_link = std::vector<Pose>(link.size(), Pose::Identity());  // pose of each body in its link
 };
 
 void Arm::read_chain(const Cell& cell) {
@@ -191,7 +192,7 @@ void Arm::read_chain(const Cell& cell) {
   read_tool(cell, bodies.X_link[static_cast<std::size_t>(bodies.path.back())]);
 }
 
-// Turns bodies of the path that have a joint into links of the chain. Returns their number.
+// Turns the bodies of the path that have a joint into links of the chain. Returns the number of links.
 int Arm::read_joints(const Cell& cell, Bodies& bodies) {
   const mjModel& m = bodies.model;
   Pose X_before = to_pose(cell.base_W);  // pose of the last body in its link
@@ -218,7 +219,7 @@ int Arm::read_joints(const Cell& cell, Bodies& bodies) {
   return count;
 }
 
-// Each drive's joint must be one of the `count` between the root and the sensor.
+// Checks that the joint of each drive is one of the `count` joints between the root and the sensor.
 void Arm::require_whole_chain(const Cell& cell, int count) const {
   if (count == axes_) return;
   for (std::size_t i = 0; i < joint_names_.size(); ++i) {
@@ -229,7 +230,7 @@ void Arm::require_whole_chain(const Cell& cell, int count) const {
   }
 }
 
-// Adds each body's mass to its link. MuJoCo numbers parents before children.
+// Adds each body's mass to its link. MuJoCo numbers parents before their children.
 void Arm::read_masses(Bodies& bodies) {
   const mjModel& m = bodies.model;
   for (int body = 1; body < m.nbody; ++body) {
@@ -352,8 +353,8 @@ void Arm::points(const JointVector& q, ArmPoints& out) const noexcept {
 }
 
 JointMatrix Arm::path_curvature() const {
-  // From the outermost joint inwards. stretched_m is the largest distance from the next joint's origin to T. The lever
-  // of axis j is stretched_m plus the part of link j across the axis.
+  // The loop goes from the outermost joint inwards. stretched_m is the largest distance from the origin of the next
+  // joint to T. The lever of axis j is stretched_m plus the part of link j that is perpendicular to the axis.
   JointMatrix C = JointMatrix::Zero(axes_, axes_);
   double stretched_m = 0.0;
   for (int j = axes_ - 1; j >= 0; --j) {
@@ -374,11 +375,11 @@ JointMatrix Arm::path_curvature() const {
 // ---- statics --------------------------------------------------------------------------------------------------------
 
 JointVector Arm::gravity_torque(const Frames& frames) const noexcept {
-  // With m_i, c_i the mass and centre of mass of everything from link i outwards, τ_i = −z_i · (c_i − p_i) × m_i g, and
-  // τ_i = −z_i · m_i g for a prismatic axis.
+  // Let m_i and c_i be the mass and centre of mass of everything from link i outwards. Then τ_i = −z_i · (c_i − p_i) ×
+  // m_i g for a revolute axis, and τ_i = −z_i · m_i g for a prismatic axis.
   JointVector torque(axes_);
   double mass = 0.0;
-  Vec3 moment = Vec3::Zero();  // m_i c_i
+  Vec3 moment = Vec3::Zero();  // the sum of mass times centre of mass: m_i c_i
   for (int i = axes_ - 1; i >= 0; --i) {
     const auto k = static_cast<std::size_t>(i);
     const Link& link = links_[k];
@@ -426,10 +427,10 @@ JointVector Arm::motor_from_link(const JointVector& q, const Wrench& wrench_W) c
 
 JointVector Arm::motor_from_moving_link(const JointVector& q, const JointVector& q_dd,
                                         ToolKinematics& at_q) const noexcept {
-  // Newton–Euler recursion (Luh, Walker and Paul 1980) with all speeds zero. Outwards, with a₀ = −g:
+  // Newton–Euler recursion (Luh, Walker and Paul 1980) with all speeds zero. The pass outwards starts from a₀ = −g:
   //   α_i = α_{i−1} + z_i q̈_i,   a_i = a_{i−1} + α_{i−1} × (p_i − p_{i−1})          (prismatic: add z_i q̈_i to a_i)
   //   F_i = m_i (a_i + α_i × (c_i − p_i)),   N_i = I_i α_i
-  // and back, with f_i and n_i (about p_i) the load of link i and all beyond it:
+  // The pass back computes f_i and n_i (about p_i), the load of link i and of all links beyond link i:
   //   f_i = F_i + f_{i+1},   n_i = N_i + (c_i − p_i) × F_i + n_{i+1} + (p_{i+1} − p_i) × f_{i+1},   τ_i = z_i · n_i
   Frames frames;
   forward(q, frames);
@@ -485,11 +486,11 @@ JointVector Arm::link_from_motor(const JointVector& q_motor) const noexcept {
 // ---- dynamics -------------------------------------------------------------------------------------------------------
 
 JointMatrix Arm::link_mass_matrix(const JointVector& q) const noexcept {
-  // Composite rigid bodies (Walker and Orin 1982): everything from link j outwards has mass m, centre c and inertia I
-  // about c. Turning it about z_j at 1 rad/s² takes the force F = m z_j × (c − p_j) at c and the torque I z_j, of which
-  // axis i ≤ j must supply
-  //   M_ij = z_i · (I z_j + (c − p_i) × F).
-  // A prismatic axis j takes F = m z_j and no torque; a prismatic axis i must supply z_i · F.
+  // Composite rigid bodies (Walker and Orin 1982):
+  // 1. Everything from link j outwards has mass m, centre c and inertia I about c.
+  // 2. To turn this about z_j at 1 rad/s², the force F = m z_j × (c − p_j) at c and the torque I z_j are necessary.
+  // 3. The part of them that axis i ≤ j must supply is M_ij = z_i · (I z_j + (c − p_i) × F).
+  // 4. A prismatic axis j needs F = m z_j and no torque. A prismatic axis i must supply z_i · F.
   Frames frames;
   forward(q, frames);
   JointMatrix M(axes_, axes_);
@@ -542,12 +543,13 @@ double Arm::effective_mass(const JointVector& q, const Vec3& n_W) const noexcept
 
 TipMass Arm::effective_mass_range(const JointVector& q, int dimensions) const noexcept {
   const Eigen::Matrix3d A = mobility(q);
-  // Iterative, because the closed form for 3×3 loses half the digits of close eigenvalues.
+  // The solver is iterative, because the closed form for 3×3 loses half of the digits of close eigenvalues.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(A);
   const Vec3& values = eigen.eigenvalues();
   TipMass tip;
   const double infinite = std::numeric_limits<double>::infinity();
-  // An eigenvalue has an error of about n ε times the largest one. Below that, T can't move in its direction.
+  // An eigenvalue has an error of about n ε times the largest eigenvalue. If it is below this error, T can't move in
+  // its direction.
   const double least = 16.0 * std::numeric_limits<double>::epsilon() * values[2];
   tip.min_kg = values[2] > 0.0 ? 1.0 / values[2] : infinite;
   const int slowest = 3 - dimensions;
@@ -558,8 +560,8 @@ TipMass Arm::effective_mass_range(const JointVector& q, int dimensions) const no
 }
 
 double Arm::first_elastic_frequency_Hz(const JointVector& q) const noexcept {
-  // Axes with a rigid gear are locked with their motors, so only the block of the others remains. With K = D², K v = ω²
-  // M v becomes D⁻¹ M D⁻¹ u = u/ω².
+  // Axes with a rigid gear are locked together with their motors, so only the block of the elastic axes remains. With K
+  // = D², K v = ω² M v becomes D⁻¹ M D⁻¹ u = u/ω².
   const JointMatrix M = link_mass_matrix(q);
   std::array<int, max_axes> elastic{};
   int n = 0;

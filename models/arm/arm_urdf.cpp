@@ -42,7 +42,8 @@ std::string linked(const Urdf& urdf, const tinyxml2::XMLElement& joint, const ch
   return attribute(urdf, *element, "link");
 }
 
-// Reports a wrong mass with its line: MuJoCo would accept it for a link that doesn't move, or report it without a line.
+// Reports a wrong mass with its line. MuJoCo would accept a wrong mass of a link that doesn't move, or report it
+// without a line.
 void check_mass(const Urdf& urdf, const tinyxml2::XMLElement& link) {
   const tinyxml2::XMLElement* inertial = link.FirstChildElement("inertial");
   const tinyxml2::XMLElement* mass = inertial != nullptr ? inertial->FirstChildElement("mass") : nullptr;
@@ -62,7 +63,7 @@ void check_mass(const Urdf& urdf, const tinyxml2::XMLElement& link) {
 
 void check_axis(const Urdf& urdf, const tinyxml2::XMLElement& joint) {
   const tinyxml2::XMLElement* axis = joint.FirstChildElement("axis");
-  if (axis == nullptr) return;  // URDF's default, x
+  if (axis == nullptr) return;  // URDF's default, the x axis
   const std::string text = attribute(urdf, *axis, "xyz");
   double x = 0.0, y = 0.0, z = 0.0;
   char rest = 0;
@@ -190,8 +191,8 @@ Urdf load_urdf(const std::filesystem::path& file) {
   compiler->SetAttribute("fusestatic", "false");
   compiler->SetAttribute("discardvisual", "true");
   compiler->SetAttribute("strippath", "false");
-  // URDFs often round inertias so that the triangle inequality fails in the last digit. Without this MuJoCo refuses
-  // them.
+  // URDFs often contain rounded inertias for which the triangle inequality fails in the last digit. Without this
+  // setting, MuJoCo refuses them.
   compiler->SetAttribute("balanceinertia", "false");
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);
@@ -200,7 +201,7 @@ Urdf load_urdf(const std::filesystem::path& file) {
 }
 
 MujocoModel compile(const Urdf& urdf) {
-  // The file system in memory has 2 MB of arrays, so it is on the heap.
+  // The object is on the heap, because MuJoCo's file system in memory has 2 MB of arrays.
   struct Vfs {
     std::unique_ptr<mjVFS> files = std::make_unique<mjVFS>();
     Vfs() { mj_defaultVFS(files.get()); }

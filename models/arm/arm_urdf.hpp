@@ -1,9 +1,9 @@
-// Reads a URDF into a MuJoCo model, avoiding some of MuJoCo's defaults.
+// Reads a URDF into a MuJoCo model, and avoids some of MuJoCo's defaults.
 //
-// By default MuJoCo 2.2.2 fuses links that are fixed to each other (the flange disappears), silently ignores <mimic>,
-// and opens mesh files. So this reader parses the file first. It refuses <mimic>, drops shapes, and adds settings that
-// keep every link, in memory only. Each moving link must state its <inertial>. Mistakes are reported with file and
-// line. For set-up.
+// By default MuJoCo 2.2.2 fuses links that are fixed to each other (so the flange disappears), silently ignores
+// <mimic>, and opens mesh files. Therefore this reader parses the file first. It refuses <mimic>, removes shapes, and
+// adds settings that keep every link; all this changes only the copy in memory. Each moving link must state its
+// <inertial>. Errors are reported with file and line. For set-up, not for the cycle.
 #pragma once
 
 #include <filesystem>
@@ -28,10 +28,10 @@ struct UrdfLink {
 
 struct Urdf {
   std::filesystem::path file;
-  std::vector<UrdfJoint> joints;  // in the file's order
+  std::vector<UrdfJoint> joints;  // in the order of the file
   std::vector<UrdfLink> links;
   std::string root_link;
-  std::string mujoco_xml;  // the file as passed to MuJoCo
+  std::string mujoco_xml;  // the text that is passed to MuJoCo
 };
 
 struct MujocoModelDeleter {
@@ -39,7 +39,7 @@ struct MujocoModelDeleter {
 };
 using MujocoModel = std::unique_ptr<mjModel_, MujocoModelDeleter>;
 
-// Both throw description::SetupError.
+// Both functions throw description::SetupError.
 Urdf load_urdf(const std::filesystem::path& file);
 MujocoModel compile(const Urdf& urdf);
 

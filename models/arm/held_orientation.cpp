@@ -10,7 +10,7 @@ namespace {
 
 constexpr double damping_m_per_rad = 1e-3;
 
-// G = H⁻¹J_pᵀ(J_p H⁻¹J_pᵀ + λ²E)⁻¹, with H of prioritized_step.hpp.
+// Returns G = H⁻¹J_pᵀ(J_p H⁻¹J_pᵀ + λ²E)⁻¹, with the H of prioritized_step.hpp.
 SmallColumns3 joints_of_few_axes(const Jacobian& J_W) noexcept {
   const SmallColumns3 Jt = J_W.topRows<3>().transpose();
   const SmallColumns3 HJt = solve_positive_definite(turning_cost(J_W), Jt);
@@ -26,7 +26,7 @@ Jacobian weighted(const Jacobian& J_W) noexcept {
   return J;
 }
 
-// Three columns of Jᵀ(J Jᵀ + λ²E)⁻¹, from `first` on, with J's rotations weighted by the length.
+// Returns three columns of Jᵀ(J Jᵀ + λ²E)⁻¹, from `first` on. The rotations in J are weighted by turning_length_m.
 SmallColumns3 columns_of_inverse(const Jacobian& J_W, Eigen::Index first) noexcept {
   const Jacobian J = weighted(J_W);
   Mat6 A = J.lazyProduct(J.transpose());

@@ -16,24 +16,26 @@ namespace {
 using Vec6 = Vec<6>;
 using Status = InverseKinematicsResult::Status;
 
-// rest_share: part of a joint's step limit for turning the tool back and for the null space. end_share: part of a
-// joint's range that counts as near an end.
+// rest_share: the part of a joint's step limit that is for turning the tool back and for the null space.
+//
+// end_share: the part of a joint's range that counts as near an end.
 constexpr double rest_share = 0.1, end_share = 0.15;
-// Weight of the tool's rotation against the joints'. Below this, the orientation is given up.
+// Lowest weight of the tool's rotation against the joints' rotations. With a lower weight, the orientation isn't held.
 constexpr double least_turning_weight = 1e-3;
 
-// The logarithm of a rotation as rotation vector, |·| ≤ π. Computed from the quaternion, whose vector part is exact to
-// rounding for small angles.
+// Returns the logarithm of a rotation as a rotation vector, |·| ≤ π. It is computed from the quaternion, whose vector
+// part is exact to rounding for small angles.
 Vec3 rotation_vector(const Mat3& R) noexcept {
   Eigen::Quaterniond r(R);
   if (r.w() < 0.0) r.coeffs() = -r.coeffs();
   const double s = r.vec().norm();
-  if (s < 1e-8) return 2.0 * r.vec();  // 2 asin(s)/s = 2 (1 + s²/6 …): equal in double precision
+  if (s < 1e-8) return 2.0 * r.vec();  // 2 asin(s)/s = 2 (1 + s²/6 …), which is 2 in double precision
   return (2.0 * std::atan2(s, r.w()) / s) * r.vec();
 }
 
-// The smallest singular value and its left vector, by the power method on J⁻¹ from its largest row. Converges with the
-// squared ratio of the two smallest singular values, so it is accurate near singularities.
+// Computes the smallest singular value and its left vector, by the power method on J⁻¹, starting from the largest row
+// of J⁻¹. The convergence factor is the squared ratio of the two smallest singular values, so the result is accurate
+// near singularities.
 void smallest_singular_value(const Mat6& inverse, double& sigma, Vec6& direction) noexcept {
   Eigen::Index row = 0;
   inverse.rowwise().squaredNorm().maxCoeff(&row);
@@ -67,7 +69,8 @@ void require_straight_ways(const Arm& arm, const ToolSpace& space) {
 
 bool is_pose(const Pose& X) noexcept {
   const Mat3 R = X.linear();
-  // Products of poses deviate from orthonormal by far less than 1e-6, which wouldn't affect the solution.
+  // Products of poses deviate from orthonormal by far less than 1e-6, and a deviation of 1e-6 wouldn't affect the
+  // solution.
   return X.matrix().allFinite() && (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-6 &&
          R.determinant() > 0.0;
 }
@@ -109,7 +112,7 @@ void InverseKinematics::set_max_step(const std::array<double, max_axes>& max_ste
   other_max_step_ = Eigen::Map<const JointVector>(config_.max_step_rad.data(), arm_.axes());
 }
 
-// Updates kinematics and residuals at result.q. Returns the pose's weighted error.
+// Updates kinematics and residuals at result.q. Returns the weighted error of the pose.
 InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
   const JointVector& known = result.kinematics.q_rad;
   if (known.size() != result.q.size() || known != result.q) arm_.kinematics(result.q, result.kinematics);
@@ -124,7 +127,7 @@ InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinema
   return e;
 }
 
-// The reachable part of the error: all of it, or the position in the tool's space.
+// Returns the part of the error that the arm can correct: the whole error, or the position error in the tool's space.
 InverseKinematics::Vec6 InverseKinematics::task_error(Vec6 error, InverseKinematicsResult& result) const noexcept {
   if (reaches_orientation()) return error;
   const Vec3 e_p = projection_.lazyProduct(error.head<3>());
@@ -150,7 +153,8 @@ bool InverseKinematics::arrived(const InverseKinematicsResult& result) const noe
          (result.rotation_residual_rad <= config_.rotation_tolerance_rad || !reaches_orientation());
 }
 
-// Newton's method. True if it ended within tolerance and step limit; otherwise result.q is the last iterate.
+// Runs Newton's method. Returns true if it ended within the tolerances and the step limit; otherwise result.q is the
+// last iterate.
 bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
   Vec6 e = error(X_WT, result);
   FactoredMatrix J;
@@ -161,7 +165,7 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
     if (i == config_.max_iterations) return false;
     J.factor(task_jacobian<6>(result.kinematics));
     const Vec6 q = result.q + J.solve(e);
-    // Written so that NaN and infinity, from a singular J, are refused, too.
+    // This form of the condition also refuses NaN and infinity, which a singular J gives.
     if (!(((q - q0).array().abs() <= max_step_.array()).all())) return false;
     result.q = q;
     ++result.iterations;
@@ -169,8 +173,8 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
   }
 }
 
-// The same for other numbers of axes. Null-space motion belongs to the first step, even if the tool stands. It bends
-// the task's path slightly, which the next steps correct.
+// Does what newton() does, for arms with other numbers of axes. The first step includes motion in the null space, even
+// if the tool stands still. This motion bends the task's path slightly, and the next steps correct the path.
 bool InverseKinematics::by_priority(const JointVector& q0, const Pose& X_WT,
                                     InverseKinematicsResult& result) const noexcept {
   Vec6 pose_error = error(X_WT, result), e = task_error(pose_error, result);
@@ -198,13 +202,13 @@ void InverseKinematics::measure_singularity(InverseKinematicsResult& result) con
   result.lost_direction_W = eigen.vectors.col(lost_row_);
 }
 
-// Written so that NaN and infinity, from a singular J, count as outside.
+// This form of the condition counts NaN and infinity, which a singular J gives, as outside.
 bool InverseKinematics::within_step(const JointVector& q, const JointVector& q0) const noexcept {
   return ((q - q0).array().abs() <= other_max_step_.array()).all();
 }
 
-// The task's step, plus as much null-space motion as the limit allows. If holding the orientation exceeds the limit (a
-// stretched wrist), its weight is reduced step by step.
+// Returns the angles after the task's step, plus as much motion in the null space as the limit allows. If holding the
+// orientation would exceed the limit (for a stretched wrist), the orientation's weight is reduced in several steps.
 JointVector InverseKinematics::next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e, bool with_rest,
                                            const InverseKinematicsResult& result) const noexcept {
   PrioritizedStep step;
@@ -244,8 +248,9 @@ JointVector InverseKinematics::towards_posture(const JointVector& q) const noexc
   return -config_.posture_share * g;
 }
 
-// Damped steps within ±box of q0. Each uses the least damping that keeps it there and brings the tool nearer by at
-// least a quarter of J's prediction; with less, J is too far from linear.
+// Takes damped steps within ±box of q0. Each step uses the least damping with which the step stays within this box, and
+// brings the tool nearer to the target by at least a quarter of the distance that J predicts. If the tool gets less
+// near, the kinematics are too nonlinear for this step.
 template <int Axes>
 void InverseKinematics::damped(const Angles<Axes>& q0, const Angles<Axes>& box, int iterations, const Pose& X_WT,
                                InverseKinematicsResult& result) const noexcept {
@@ -269,8 +274,8 @@ void InverseKinematics::damped(const Angles<Axes>& q0, const Angles<Axes>& box, 
     const Angles<Axes> q_before = result.q;
     const double before = e.norm();
     constexpr double quarter = 0.25;
-    // Values of σ below 1e-8 σ_max are rounding of J Jᵀ. λ is tried from there to far above σ_max, where steps are
-    // tiny.
+    // Values of σ below 1e-8 σ_max are rounding errors of J Jᵀ. The values tried for λ begin at 1e-8 σ_max and end far
+    // above σ_max, where steps are tiny.
     double lambda2 = 1e-16 * squares[5];
     bool nearer = false;
     for (int rung = 0; rung < 24 && !nearer; ++rung, lambda2 *= 8.0) {
@@ -332,7 +337,7 @@ void InverseKinematics::solve_for(const JointVector& q, const Pose& X_WT,
   }
   result.q = q;
   damped<Axes>(q0, most, config_.max_damped_iterations, X_WT, result);
-  // Whether the limit stopped the joints: one of them has used most of it.
+  // Whether the step limit stopped the joints: one joint has used more than half of its limit.
   const bool at_limit = ((result.q - q0).array().abs() > 0.5 * most.array()).any();
   result.status = arrived(result)                                                         ? Status::converged
                   : result.smallest_singular_value_m_per_rad < config_.singular_m_per_rad ? Status::singular
@@ -356,7 +361,7 @@ std::optional<JointVector> InverseKinematics::solve_anywhere(const Pose& X_WT, c
       damped<Eigen::Dynamic>(result.q, JointVector::Constant(arm_.axes(), anywhere), iterations, X_WT, result);
     }
     if (!arrived(result)) continue;
-    // Full turns don't move the tool, so each joint goes as near to q_near as its range allows.
+    // Full turns don't move the tool, so each joint is turned as near to q_near as its range allows.
     bool inside = true;
     for (int i = 0; i < arm_.axes(); ++i) {
       constexpr double turn = 2.0 * std::numbers::pi;

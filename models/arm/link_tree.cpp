@@ -15,7 +15,7 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-// The three numbers of an attribute, or `missing`.
+// Returns the three numbers of an attribute, or `missing`.
 Vec3 triple_of(const XMLElement* element, const char* name, const Vec3& missing) {
   const char* const text = element != nullptr ? element->Attribute(name) : nullptr;
   double x = 0.0, y = 0.0, z = 0.0;
@@ -36,7 +36,7 @@ double size_of(const XMLElement& element, const char* name) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-// The robot's named colours, for <material name="…">.
+// The named colours of the robot, for <material name="…">.
 using Colours = std::map<std::string, std::array<double, 3>>;
 
 std::optional<std::array<double, 3>> colour_of(const XMLElement* material, const Colours& named) {
@@ -59,7 +59,8 @@ Colours colours_of(const XMLElement& robot) {
   return colours;
 }
 
-// Searches "package://name/path" in the URDF's folder and the folders above: only ROS would know the package's place.
+// Searches for "package://name/path" in the URDF's folder and in the folders above it, because only ROS knows where the
+// package is.
 std::filesystem::path mesh_path(const std::filesystem::path& urdf, const std::string& name) {
   constexpr std::string_view package = "package://", file = "file://";
   if (name.compare(0, file.size(), file) == 0) return name.substr(file.size());
@@ -72,7 +73,7 @@ std::filesystem::path mesh_path(const std::filesystem::path& urdf, const std::st
   return folder / within;
 }
 
-// Returns nullopt if the shape can't be drawn.
+// Returns the shape of a <visual>, or nullopt if it can't be drawn.
 std::optional<LinkShape> shape_of(const XMLElement& visual, const std::filesystem::path& urdf, const Colours& named) {
   const XMLElement* const geometry = visual.FirstChildElement("geometry");
   const XMLElement* const given = geometry != nullptr ? geometry->FirstChildElement() : nullptr;
@@ -120,7 +121,7 @@ UrdfLinks read_shapes(const XMLElement& robot, const std::filesystem::path& urdf
 }  // namespace
 
 LinkTree::LinkTree(const description::Cell& cell) : X_WB_(to_pose(cell.base_W)) {
-  const Urdf urdf = load_urdf(cell.urdf);  // refuses anything but a tree of links
+  const Urdf urdf = load_urdf(cell.urdf);  // throws unless the links are a tree
   tinyxml2::XMLDocument document;
   if (document.LoadFile(cell.urdf.c_str()) != tinyxml2::XML_SUCCESS || document.RootElement() == nullptr) {
     throw description::SetupError({.file = cell.urdf.string(), .message = "can't be read a second time"});

@@ -1,8 +1,8 @@
-// The shapes and poses of an arm's links, for pictures; never for control.
+// Reads the shapes of an arm's links and computes the links' poses. Only for pictures, never for control.
 //
-// Reads the URDF a second time, without MuJoCo: all links, with their <visual> shapes. A shape that can't be drawn
-// (unknown to URDF, or a mesh file of another format) is left out and named in notes(): an incomplete picture is better
-// than none.
+// Reads the URDF a second time, without MuJoCo: all links with their <visual> shapes. A shape that can't be drawn (a
+// shape unknown to URDF, or a mesh file of another format) is left out and named in notes(), because an incomplete
+// picture is better than no picture.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ namespace proxarm::models {
 struct DrawnBox {
   Vec3 size_m = Vec3::Ones();
 };
-struct DrawnCylinder {  // along z, centred at the origin
+struct DrawnCylinder {  // along z, with its centre at the origin
   double radius_m = 0.0, length_m = 0.0;
 };
 struct DrawnSphere {
@@ -40,11 +40,11 @@ struct LinkShape {
 
 struct DrawnLink {
   std::string name;
-  int parent = -1;                   // index of the parent link; −1: the root
-  Pose X_parent = Pose::Identity();  // the joint's pose in the parent at angle zero
-  Vec3 axis = Vec3::UnitX();         // the joint's, in the link
-  int drive = -1;                    // index in the cell's drives; −1: fixed
-  bool slides = false;               // prismatic along the axis, in m; otherwise revolute
+  int parent = -1;                   // index of the parent link; −1: this link is the root
+  Pose X_parent = Pose::Identity();  // the pose of the joint in the parent link at joint angle zero
+  Vec3 axis = Vec3::UnitX();         // the axis of the joint, in this link
+  int drive = -1;                    // index in the cell's drives; −1: the joint is fixed
+  bool slides = false;               // true: prismatic along the axis, in m; false: revolute
   std::vector<LinkShape> shapes;
 };
 
@@ -53,10 +53,10 @@ class LinkTree {
   // Throws description::SetupError if the URDF can't be read.
   explicit LinkTree(const description::Cell& cell);
 
-  // All links, parents before their children.
+  // Returns all links, each parent before its children.
   [[nodiscard]] const std::vector<DrawnLink>& links() const noexcept { return links_; }
   [[nodiscard]] const std::vector<std::string>& notes() const noexcept { return notes_; }
-  // The pose of each link in W for joint angles in the order of the cell's drives.
+  // Computes the pose of each link in W, for joint angles in the order of the cell's drives.
   void place(const JointVector& q, std::vector<Pose>& X_W) const;
 
  private:

@@ -6,7 +6,7 @@ namespace proxarm::models {
 
 PrioritizedStep prioritized_step(const JointMatrix& A, const SmallVector& e, const JointMatrix& H,
                                  const JointVector& g) noexcept {
-  // H⁻¹ [Aᵀ g] from one factorisation; A has at most six rows, so g fits beside Aᵀ.
+  // Computes H⁻¹ [Aᵀ g] by one factorisation. A has at most six rows, so g fits beside Aᵀ.
   const Eigen::Index rows = A.rows();
   JointMatrix right(A.cols(), rows + 1);
   right.leftCols(rows) = A.transpose();

@@ -16,7 +16,7 @@ ToolInertia tool_about_T(const description::ToolDescription& tool) noexcept {
   const Mat3 R_ST = to_pose(tool.handle_S).linear();
   const Mat3 about_centre_S = inertia_about_centre_S(tool);
   const Vec3 r_S = Vec3(tool.centre_of_mass_S_m.data()) - Vec3(tool.handle_S.position_m.data());
-  // Steiner: I_T = I_C + m (r·r E − r rᵀ)
+  // Steiner's theorem: I_T = I_C + m (r·r E − r rᵀ).
   const Mat3 about_T_S = about_centre_S + tool.mass_kg * (r_S.squaredNorm() * Mat3::Identity() - r_S * r_S.transpose());
   return {.mass_kg = tool.mass_kg,
           .centre_T_m = R_ST.transpose() * r_S,

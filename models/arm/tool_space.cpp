@@ -9,8 +9,8 @@ namespace proxarm::models {
 namespace {
 
 constexpr int poses = 100;
-constexpr double leaves = 1e-3;   // see the header
-constexpr double rounded = 1e-4;  // an axis of the space this near to one of W's becomes that axis
+constexpr double leaves = 1e-3;   // see tool_space() in the header
+constexpr double rounded = 1e-4;  // an axis of the space that is this near to an axis of W becomes that axis
 
 Vec3 snapped(const Vec3& axis) noexcept {
   Eigen::Index most = 0;
@@ -19,7 +19,7 @@ Vec3 snapped(const Vec3& axis) noexcept {
   return (towards - Vec3::Unit(most)).norm() < rounded ? Vec3(Vec3::Unit(most)) : towards;
 }
 
-// The plane's axes, as near to W's as possible.
+// Returns the axes of a plane, as near to the axes of W as possible, and the normal.
 Mat3 plane_axes(const Vec3& normal) noexcept {
   Eigen::Index least = 0;
   normal.cwiseAbs().minCoeff(&least);
@@ -47,7 +47,8 @@ JointVector spread_pose(const Arm& arm, int index) {
 }
 
 ToolSpace tool_space(const Arm& arm) {
-  Mat6 squares = Mat6::Zero();  // of the velocities; three rows of padding for symmetric_eigen() sort last
+  // Sum of the squares of the velocities. symmetric_eigen() takes six rows; the three added rows sort last.
+  Mat6 squares = Mat6::Zero();
   ToolKinematics tool;
   for (int i = 0; i < poses; ++i) {
     arm.kinematics(i == 0 ? arm.start_rad() : spread_pose(arm, i), tool);

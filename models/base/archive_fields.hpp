@@ -1,11 +1,11 @@
-// Archives a plain struct without a list of its members, from which one could be forgotten.
+// Archives a plain struct without a list of the struct's members, because a list could omit a member.
 //
 //   struct State { double angle_rad = 0.0; models::Vec3 q_W = models::Vec3::Zero(); };
 //   void archive(StateArchive& state) noexcept { archive_fields(state, state_); }
 //
-// The number of initialisers that the aggregate accepts counts the members; a structured binding of that size names
-// them. Members are types that StateArchive accepts, or plain structs. No base classes, no C arrays, at most 16
-// members.
+// The number of members is the number of initialisers that the aggregate accepts. A structured binding of that number
+// accesses the members. A member must have a type that StateArchive accepts, or be a plain struct. The struct may have
+// at most 16 members, no base classes and no C arrays.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 namespace proxarm::fieldbus {
 namespace detail {
 
-// Converts to a member of any type; only declared, never defined.
+// Converts to a member of any type. The conversion is only declared, never defined.
 struct AnyMember {
   template <typename T>
   operator T() const noexcept;  // NOLINT(google-explicit-constructor)
@@ -39,7 +39,7 @@ constexpr std::size_t count_fields() {
   }
 }
 
-// A struct without an archive() function. An array is archived as a whole.
+// A struct without an archive() function. An array isn't a PlainStruct; it is archived as a whole.
 template <typename T>
 concept PlainStruct = std::is_class_v<T> && std::is_aggregate_v<T> && !requires {
   std::tuple_size<T>::value;
@@ -51,7 +51,7 @@ concept PlainStruct = std::is_class_v<T> && std::is_aggregate_v<T> && !requires 
 template <typename T>
 inline constexpr std::size_t field_count = detail::count_fields<T>();
 
-// Calls visit(member) for each member of the struct, in the order of declaration.
+// Calls visit(member) for each member of the struct, in the order of their declaration.
 template <typename T, typename Visit>
 constexpr void for_each_field(T& object, Visit&& visit) noexcept {
   const auto each = [&](auto&... member) { (visit(member), ...); };

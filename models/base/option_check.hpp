@@ -1,5 +1,5 @@
-// Helpers for validate() functions: a value out of range becomes a SetupError with the option's name, the value found
-// and the range expected.
+// Helpers for validate() functions: they turn a value outside its range into a SetupError with the option's name, the
+// value found and the expected range.
 #pragma once
 
 #include <cmath>

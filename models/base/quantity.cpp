@@ -11,8 +11,8 @@
 namespace proxarm::description {
 namespace {
 
-// SI value = number · multiply / divide. Powers of ten are exact in a double, and dividing by one rounds once, so "1ms"
-// equals 1e-3 exactly.
+// A unit: the SI value is number · multiply / divide. Powers of ten are exact in a double, and a division by one of
+// them rounds once. So "1ms" equals 1e-3 exactly.
 struct Unit {
   std::string_view name;
   double multiply, divide;
@@ -55,7 +55,8 @@ double parse(std::string_view text, std::string_view option, const Kind& kind) {
   std::string_view rest = text;
   while (rest.starts_with(' ')) rest.remove_prefix(1);
   while (rest.ends_with(' ')) rest.remove_suffix(1);
-  // The longest beginning that is a number; the rest is the unit. ("1e3s" is 1000 s; no unit begins with e.)
+  // Finds the longest beginning of the text that is a number; the rest is the unit. ("1e3s" is 1000 s, because no unit
+  // begins with e.)
   std::size_t length = std::min<std::size_t>(rest.size(), 64);
   std::optional<double> number;
   while (length > 0 && !(number = strict_number(rest.substr(0, length)))) --length;

@@ -1,4 +1,4 @@
-// A scripted request, its time, and its outcome.
+// Defines a scripted request with its time and its outcome.
 #pragma once
 
 #include <cstdint>
@@ -7,10 +7,11 @@ namespace proxarm::controller {
 
 template <typename T>
 struct Scheduled {
-  std::int64_t at_ns = 0;  // time since the first cycle, or since rendering began; the receiver of requests says which
+  // Time since the first cycle or since rendering began; the class that receives the requests defines which.
+  std::int64_t at_ns = 0;
   T request;
-  bool taken = false;             // due while the session ran
-  const char* refusal = nullptr;  // why it was refused; null: it wasn't
+  bool taken = false;             // whether the request was due while the session ran
+  const char* refusal = nullptr;  // why the request was refused; null: it wasn't refused
 };
 
 }  // namespace proxarm::controller

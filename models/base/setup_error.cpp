@@ -48,7 +48,7 @@ std::string in_quotes(std::string_view text, std::size_t max_bytes) {
     if (i >= max_bytes) return out + "...\"";
     const std::size_t length = utf8_length(text.substr(i));
     const auto byte = static_cast<unsigned char>(text[i]);
-    // U+0080..U+009F control terminals, too.
+    // U+0080..U+009F are control characters of terminals, too.
     const bool c1 = length == 2 && byte == 0xc2 && static_cast<unsigned char>(text[i + 1]) < 0xa0;
     if (length == 0 || byte < 0x20 || byte == 0x7f || c1) {
       constexpr std::string_view digits = "0123456789abcdef";
@@ -65,7 +65,7 @@ std::string in_quotes(std::string_view text, std::size_t max_bytes) {
 std::string number_text(double value) {
   std::array<char, 32> buffer;
   const double size = std::abs(value);
-  const bool fixed = value == 0.0 || (size >= 1e-5 && size < 1e15);  // at most 6 + 17 digits
+  const bool fixed = value == 0.0 || (size >= 1e-5 && size < 1e15);  // the result then has at most 6 + 17 digits
   const auto format = fixed ? std::chars_format::fixed : std::chars_format::scientific;
   const auto result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, format);
   return {buffer.data(), result.ptr};

@@ -1,10 +1,10 @@
-// The exception for set-up mistakes: a file, an option, a bus or a drive that isn't as required.
+// Defines the exception for mistakes at set-up: a file, an option, a bus or a drive isn't as required.
 //
-// States the place (file, line, key; or bus, node, object), the value found, the value expected and what to do. what()
-// is one line, such as
+// The error states the place (file, line, key; or bus, node, object), the value found, the value expected, and what to
+// do. what() returns one line, such as
 //   scenes/wall.yaml:12: objects[0].friction: found -0.3, expected a number from 0 to 10 (no unit)
 //   bus axes_1_3, node 2, object 1000h:00: found 0x00030191, expected 0x00020192; is another drive set to this node?
-// Thrown only during set-up, never from the cycle. The command line then exits with status 2.
+// It is thrown only during set-up, never from the cycle. The command line then exits with status 2.
 #pragma once
 
 #include <stdexcept>
@@ -13,19 +13,21 @@
 
 namespace proxarm::description {
 
-// All fields may be empty. Meant for designated initialisers: SetupError({.key = "--mass", .found = "-1", ...}).
+// The parts of an error. All fields may be empty. Use designated initialisers: SetupError({.key = "--mass", .found =
+// "-1", ...}).
 struct SetupProblem {
-  std::string file{};      // as the user gave it
-  int line = 0;            // from 1; 0: unknown
-  int column = 0;          // from 1; 0: unknown
-  std::string bus{};       // name in the cell, or interface
-  int node = 0;            // CANopen node or Modbus unit; 0: none
-  std::string object{};    // object of the node, such as "1000h:00 device type"
-  std::string key{};       // dotted path in the file, such as objects[0].friction; or an option of the command line
-  std::string message{};   // a sentence, if found and expected aren't enough
-  std::string found{};     // value found
-  std::string expected{};  // range or kind expected, with its unit
-  std::string advice{};    // what to do
+  std::string file{};    // as the user gave it
+  int line = 0;          // from 1; 0: unknown
+  int column = 0;        // from 1; 0: unknown
+  std::string bus{};     // name in the cell, or name of the interface
+  int node = 0;          // CANopen node or Modbus unit; 0: no node
+  std::string object{};  // object in the node, such as "1000h:00 device type"
+  // The dotted path in the file, such as objects[0].friction, or an option of the command line.
+  std::string key{};
+  std::string message{};   // a sentence, if `found` and `expected` aren't enough
+  std::string found{};     // the value found
+  std::string expected{};  // the expected range or kind, with its unit
+  std::string advice{};    // what the user can do
 };
 
 class SetupError : public std::runtime_error {
@@ -48,11 +50,11 @@ class SetupError : public std::runtime_error {
   SetupProblem problem_;
 };
 
-// Foreign text, made safe for one line of a message: control characters and broken UTF-8 as \xNN, at most `max_bytes`
-// long (then "..."), in double quotes.
+// Returns foreign text in double quotes, safe for one line of a message. Control characters and broken UTF-8 are
+// replaced by \xNN. The text ends with "..." after `max_bytes`.
 std::string in_quotes(std::string_view text, std::size_t max_bytes = 60);
 
-// The shortest decimal that reads back as the same number.
+// Returns the shortest decimal number that reads back as `value`.
 std::string number_text(double value);
 
 }  // namespace proxarm::description

@@ -1,4 +1,4 @@
-// SHA-256 by OpenSSL: for signatures of mesh caches and the hash of a session's setpoints.
+// Computes SHA-256 by OpenSSL, for the signatures of mesh caches and for the hash of a session's setpoints.
 #pragma once
 
 #include <array>
@@ -19,7 +19,8 @@ class Sha256 {
   Sha256& operator=(Sha256&&) noexcept;
 
   void add(std::span<const std::byte> bytes) noexcept;
-  // The digest of the bytes so far; more may follow. nullopt if OpenSSL doesn't compute it on this machine.
+  // Returns the digest of the bytes so far; more bytes may follow. Returns nullopt if OpenSSL can't compute SHA-256 on
+  // this machine.
   [[nodiscard]] std::optional<Digest> digest() const noexcept;
 
  private:

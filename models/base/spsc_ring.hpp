@@ -1,8 +1,8 @@
-// A lock-free queue between two threads: one pushes (the cycle), one pops (a writer of files).
+// A lock-free queue between two threads: one thread pushes (the cycle), the other thread pops (a writer of files).
 //
 // Only the constructor allocates. push() to a full ring drops the item and counts it, so the cycle never waits for a
-// disk. The two indices are on separate cache lines, and each side keeps a copy of the other's index. So push and pop
-// read the other's line only if the copy says full or empty.
+// disk. The two indices are on separate cache lines, and each thread keeps a copy of the other thread's index. push()
+// and pop() read the other thread's cache line only if the copy says that the ring is full or empty.
 #pragma once
 
 #include <atomic>
@@ -19,14 +19,14 @@ class SpscRing {
   static_assert(std::is_trivially_copyable_v<T>, "what crosses threads is plain data");
 
  public:
-  // Room for at least `capacity` items: the next power of two, at least 2.
+  // Makes room for at least `capacity` items. The number of items is the next power of two, at least 2.
   explicit SpscRing(std::size_t capacity)
       : items_(std::bit_ceil(capacity < 2 ? std::size_t{2} : capacity)), mask_(items_.size() - 1) {}
 
   SpscRing(const SpscRing&) = delete;
   SpscRing& operator=(const SpscRing&) = delete;
 
-  // Producer only. False if full: the item is dropped and counted.
+  // Only for the thread that pushes. Returns false if the ring is full; the item is then dropped and counted.
   bool push(const T& item) noexcept {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail - head_seen_ == items_.size()) {
@@ -41,13 +41,13 @@ class SpscRing {
     return true;
   }
 
-  // Producer only: this many pushes will succeed.
+  // Only for the thread that pushes. Returns the number of pushes that will succeed.
   [[nodiscard]] std::size_t room() noexcept {
     head_seen_ = head_.load(std::memory_order_acquire);
     return items_.size() - (tail_.load(std::memory_order_relaxed) - head_seen_);
   }
 
-  // Consumer only. False if empty.
+  // Only for the thread that pops. Returns false if the ring is empty.
   bool pop(T& item) noexcept {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head == tail_seen_) {
@@ -60,19 +60,22 @@ class SpscRing {
   }
 
   [[nodiscard]] std::size_t capacity() const noexcept { return items_.size(); }
-  // Any thread: the number of dropped items.
+  // For any thread. Returns the number of dropped items.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
  private:
-  // 64 bytes on all supported CPUs; clang 14 lacks std::hardware_destructive_interference_size.
+  // A cache line has 64 bytes on all supported CPUs. (clang 14 doesn't have
+  // std::hardware_destructive_interference_size.)
   static constexpr std::size_t cache_line = 64;
 
   std::vector<T> items_;
   std::size_t mask_;
-  alignas(cache_line) std::atomic<std::size_t> tail_{0};  // producer's line
+  // The cache line of the thread that pushes begins here.
+  alignas(cache_line) std::atomic<std::size_t> tail_{0};
   std::size_t head_seen_ = 0;
   std::atomic<std::uint64_t> dropped_{0};
-  alignas(cache_line) std::atomic<std::size_t> head_{0};  // consumer's line
+  // The cache line of the thread that pops begins here.
+  alignas(cache_line) std::atomic<std::size_t> head_{0};
   std::size_t tail_seen_ = 0;
   [[maybe_unused]] alignas(cache_line) char end_of_line_ = 0;
 };

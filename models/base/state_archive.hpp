@@ -1,9 +1,11 @@
-// An object's state that changes from cycle to cycle, as bytes: a black box writes them, a replay reads them.
+// Stores the state of an object that changes from cycle to cycle as bytes. A black box writes these bytes, and a replay
+// reads them.
 //
-// A class names its changing members once, for both directions:
+// A class lists the members that change once, for writing and reading:
 //   void archive(StateArchive& state) noexcept { state(q_k1_, q_k2_, contacts_); }
-// Members are plain data, Eigen vectors, or classes with an archive() function. Writing needs no heap. Input comes from
-// untrusted files: sizes are checked here; owners of indices must check those.
+// Members are plain data, Eigen vectors, or classes with an archive() function. Writing doesn't allocate. The bytes
+// that are read may come from untrusted files: this class checks sizes, and the owners of indices must check the
+// indices.
 #pragma once
 
 #include <cstddef>
@@ -26,12 +28,12 @@ class StateArchive {
     (pass(members), ...);
   }
 
-  // Bytes unchanged.
+  // Writes or reads bytes without a conversion.
   void raw(std::span<std::byte> bytes) noexcept { copy(bytes.data(), bytes.size()); }
 
   [[nodiscard]] bool reading() const noexcept { return in_ != nullptr; }
   [[nodiscard]] std::size_t bytes() const noexcept { return at_; }
-  // False if writing ran out of room or reading out of bytes.
+  // False if the room was too small for writing, or if there were too few bytes for reading.
   [[nodiscard]] bool whole() const noexcept { return !short_; }
 
  private:

@@ -15,7 +15,8 @@ std::size_t digits(std::string_view text) {
   return static_cast<std::size_t>(std::find_if_not(text.begin(), text.end(), is_digit) - text.begin());
 }
 
-// Edit distance with transpositions of neighbours. Words are short, so the whole table is kept.
+// Returns the edit distance of two words, where transposing two neighbouring letters is one edit. The whole table is
+// stored, because words are short.
 std::size_t distance(std::string_view a, std::string_view b) {
   const std::size_t columns = b.size() + 1;
   std::vector<std::size_t> table((a.size() + 1) * columns);
@@ -47,17 +48,17 @@ std::size_t utf8_length(std::string_view text) noexcept {
     if ((byte(i) & 0xc0) != 0x80) return 0;
   }
   const unsigned second = byte(1);
-  if (first == 0xe0 && second < 0xa0) return 0;  // overlong
-  if (first == 0xed && second > 0x9f) return 0;  // surrogates
-  if (first == 0xf0 && second < 0x90) return 0;  // overlong
-  if (first == 0xf4 && second > 0x8f) return 0;  // above U+10FFFF
+  if (first == 0xe0 && second < 0xa0) return 0;  // an overlong encoding
+  if (first == 0xed && second > 0x9f) return 0;  // a surrogate
+  if (first == 0xf0 && second < 0x90) return 0;  // an overlong encoding
+  if (first == 0xf4 && second > 0x8f) return 0;  // a character above U+10FFFF
   return length;
 }
 
 std::optional<double> strict_number(std::string_view text) noexcept {
   std::string_view rest = text;
   if (!rest.empty() && (rest[0] == '+' || rest[0] == '-')) rest.remove_prefix(1);
-  if (text.starts_with('+')) text = rest;  // from_chars accepts no plus
+  if (text.starts_with('+')) text = rest;  // from_chars doesn't accept a plus sign
   const std::size_t whole = digits(rest);
   if (whole > 1 && rest[0] == '0') return std::nullopt;
   bool zero = whole == 0 || rest[0] == '0';
@@ -106,14 +107,15 @@ std::optional<std::int64_t> strict_integer(std::string_view text) noexcept {
 }
 
 std::string nearest(std::string_view word, std::span<const std::string> candidates) {
-  constexpr std::size_t longest = 80;  // longer words aren't typing errors, and the table is quadratic
+  // A longer word isn't a typing error, and the table of distance() is quadratic.
+  constexpr std::size_t longest = 80;
   if (word.empty() || word.size() > longest) return {};
   std::string best;
   std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
   for (const std::string& candidate : candidates) {
     if (candidate.empty() || candidate.size() > longest) continue;
     std::size_t d = distance(word, candidate);
-    // The unit or the frame is missing, on either side.
+    // The unit or the frame is missing in the word or in the candidate.
     if (candidate.starts_with(std::string(word) + "_") || word.starts_with(candidate + "_")) d = 1;
     const std::size_t cut = std::min(word.find('_'), word.size());
     if (cut > 2 && candidate.substr(0, cut + 1) == word.substr(0, cut + 1)) d = std::min<std::size_t>(d, 2);

@@ -25,24 +25,27 @@ PoseDescription pose_or_identity(const YamlNode& node, std::string_view key) {
   return pose ? read_pose(*pose) : PoseDescription{};
 }
 
-// The path of a scene or a hand. Doesn't check that the file exists: a run may name another one.
+// Returns the path of a scene or a hand, or an empty string. Doesn't check that the file exists, because a run may use
+// another file.
 std::string absolute_path_or_empty(const YamlNode& node, std::string_view key) {
   return node.has(key) ? node.path_of(key).string() : std::string();
 }
 
-// A name for the command line (--bus NAME=IFACE,…), for files and for messages.
+// Reads a name that is used on the command line (--bus NAME=IFACE,…), in files and in messages.
 std::string read_name(const YamlNode& node, std::string_view key) {
   return text_like(node, key, {"[A-Za-z0-9_.-]{1,64}", "a name of letters, digits, _, - and . (at most 64)"});
 }
 
-// A physical inertia: positive semidefinite, and its principal moments satisfy the triangle inequality. Both hold if
-// the pseudo-inertia tr(I)/2·E − I is positive semidefinite: tr(I)/2 − λ_i = (λ_j + λ_k − λ_i)/2 ≥ 0, and λ_j + λ_k ≥
-// λ_i for all three makes each λ ≥ 0.
+// Whether an inertia is physical: positive semidefinite, with principal moments λ that satisfy the triangle inequality.
+// The test is that the pseudo-inertia tr(I)/2·E − I is positive semidefinite, for these reasons:
+// 1. The eigenvalues of the pseudo-inertia are tr(I)/2 − λ_i = (λ_j + λ_k − λ_i)/2. So the test is the triangle
+//    inequality.
+// 2. The three triangle inequalities together make each λ ≥ 0, so the inertia is positive semidefinite.
 bool is_physical(const std::array<double, 6>& inertia) {
   const auto [xx, yy, zz, xy, xz, yz] = inertia;
   const double half = 0.5 * (xx + yy + zz);
   const double a = half - xx, b = half - yy, c = half - zz, d = -xy, e = -xz, f = -yz;
-  // Slack for values rounded to four digits on the boundary, such as a flat plate's inertia.
+  // The slack allows values that are rounded to four digits and are on the boundary, such as a flat plate's inertia.
   const double slack = 1e-4 * half;
   const double A = a + slack, B = b + slack, C = c + slack;
   return half >= 0.0 && A >= 0.0 && B >= 0.0 && C >= 0.0 && A * B - d * d >= 0.0 && A * C - e * e >= 0.0 &&
@@ -99,8 +102,8 @@ ModbusLineDescription read_modbus_line(const YamlNode& node) {
   return line;
 }
 
-// Lowest bandwidth of a filter (0: no filter). A control loop couldn't bear the delay of a slower one, and the filter's
-// eigenvalues would take long to find.
+// Lowest bandwidth of a filter (0: no filter). A control loop couldn't tolerate the delay of a slower filter, and
+// finding the filter's eigenvalues would take long.
 constexpr double least_bandwidth_Hz = 5.0;
 
 double bandwidth_or(const YamlNode& node, std::string_view key, double otherwise, double max_Hz) {
@@ -146,7 +149,7 @@ BoxDescription read_box(const YamlNode& node) {
   return box;
 }
 
-// A vector in this direction, scaled to length one.
+// Reads a vector and returns it scaled to length one.
 std::array<double, 3> read_direction(const YamlNode& node, const char* key, const std::array<double, 3>& otherwise) {
   std::array<double, 3> way = node.vec3_or(key, otherwise, between(-1e3, 1e3));
   const double length = std::hypot(way[0], way[1], way[2]);
@@ -165,7 +168,7 @@ CellLimits read_limits(const YamlNode& node) {
       node.number_or("max_tool_acceleration_m_per_s2", limits.max_tool_acceleration_m_per_s2, above(0.0, 1000.0));
   limits.max_turning_speed_rad_per_s =
       node.number_or("max_turning_speed_rad_per_s", limits.max_turning_speed_rad_per_s, above(0.0, 20.0));
-  // Smaller than π by more than a step, so that no step can jump past the limit.
+  // The largest angle is smaller than π by more than the motion of a step, so that no step can jump past the limit.
   limits.max_turn_rad = node.number_or("max_turn_rad", limits.max_turn_rad, 0.0, 3.0);
   if (node.has("max_tilt_rad")) limits.max_tilt_rad = node.number("max_tilt_rad", 0.0, 3.0);
   if (node.has("max_twist_rad")) limits.max_twist_rad = node.number("max_twist_rad", 0.0, 3.0);
@@ -199,7 +202,7 @@ void check_bus(const YamlNode& node, const std::string& bus, const std::vector<B
                       meant.empty() ? "" : "did you mean " + in_quotes(meant) + "?");
 }
 
-// The list may be empty: all drives and the sensor may be on Modbus lines.
+// Reads the CAN buses. The list may be empty, because all drives and the sensor may be on Modbus lines.
 void read_buses(const YamlNode& root, Cell& cell) {
   for (const YamlNode& node : root.list("buses", 0, 16)) {
     const BusDescription bus = read_bus(node);
@@ -231,7 +234,8 @@ void check_line(const YamlNode& node, const std::string& line, const std::vector
                                            : "one of this cell's modbus_lines: " + one_of(names));
 }
 
-// Checks that drive and bus agree on CAN FD: a classic node answers every FD frame with an error frame.
+// Checks that drive and bus agree on CAN FD, because a drive for classic CAN answers every FD frame with an error
+// frame.
 void check_format(const YamlNode& node, const DriveDescription& drive, const std::vector<BusDescription>& buses) {
   const auto bus =
       std::find_if(buses.begin(), buses.end(), [&](const BusDescription& b) { return b.name == drive.bus; });
@@ -288,7 +292,7 @@ void read_start(const YamlNode& root, Cell& cell) {
   }
 }
 
-// The enabling input's drive must be on CAN; the input's bus is that drive's.
+// Reads the enabling input. Its drive must be on CAN; the bus of the input is the bus of this drive.
 EnablingInputDescription read_enabling(const YamlNode& node, const Cell& cell) {
   EnablingInputDescription input = read_enabling_input(node);
   if (input.drive.empty()) {

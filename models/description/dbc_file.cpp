@@ -12,12 +12,12 @@ namespace proxarm::description {
 namespace {
 
 constexpr std::size_t max_bytes = 4U << 20, max_messages = 4096, max_signals = 512;
-constexpr int max_bytes_of_message = 64;  // of CAN FD
+constexpr int max_bytes_of_message = 64;  // the longest data of CAN FD
 constexpr std::uint32_t extended_bit = 0x80000000U, unassigned_id = 0xC0000000U;
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 constexpr std::string_view unassigned_name = "VECTOR__INDEPENDENT_SIG_MSG";
 
-// Sections that may follow one whose ';' is missing.
+// The sections that end a section whose ';' is missing.
 constexpr std::string_view known_sections[] = {"BO_",          "SG_",         "CM_",       "VAL_",
                                                "VAL_TABLE_",   "BA_",         "BA_DEF_",   "BA_DEF_DEF_",
                                                "SIG_VALTYPE_", "SG_MUL_VAL_", "BO_TX_BU_", "SIG_GROUP_"};
@@ -63,7 +63,7 @@ class Reader {
     rest_.remove_prefix(length);
   }
 
-  // Blanks, ends of lines, and // comments, which some tools write.
+  // Skips blanks, ends of lines and // comments, which some tools write.
   void skip_blanks() {
     for (;;) {
       if (rest_.starts_with("//")) rest_.remove_prefix(std::min(rest_.find('\n'), rest_.size()));
@@ -167,7 +167,7 @@ class Reader {
     skip_section(dbc, name);
   }
 
-  // Skips to the section's ';'. If it is missing, stops at the next known section.
+  // Skips to the ';' that ends the section. If the ';' is missing, stops at the next known section.
   void skip_section(DbcFile& dbc, const std::string& name) {
     while (token_.kind != Token::Kind::end && !at_sign(';') && !(first_in_line_ && begins_known_section())) advance();
     if (!at_sign(';')) {
@@ -182,8 +182,9 @@ class Reader {
            std::find(std::begin(known_sections), std::end(known_sections), token_.text) != std::end(known_sections);
   }
 
-  // BA_ "SystemSignalLongSymbol" SG_ 256 Fx_of_the_sen "Fx_of_the_sensor_at_the_flange": a name that was cut to 32
-  // characters. Leaves the rest, and any other BA_, to skip_section().
+  // Reads a name that an editor cut to 32 characters:
+  //   BA_ "SystemSignalLongSymbol" SG_ 256 Fx_of_the_sen "Fx_of_the_sensor_at_the_flange"
+  // Leaves the rest of this section, and any other BA_ section, to skip_section().
   void read_long_name(DbcFile& dbc) {
     if (token_.kind != Token::Kind::string) return;
     const bool of_signal = token_.text == "SystemSignalLongSymbol",
@@ -212,13 +213,13 @@ class Reader {
     }
   }
 
-  // The message to which the next signals belong.
+  // Returns the message to which the next signals belong.
   DbcMessage* current(DbcFile& dbc) {
     if (in_unassigned_) return &unassigned_;
     return dbc.messages.empty() ? nullptr : &dbc.messages.back();
   }
 
-  // Notes an error with the current message, and continues at the next line that begins a section.
+  // Calls read(). Stores an error with the current message, and continues at the next line that begins a section.
   template <typename Read>
   void read_or_note(DbcFile& dbc, Read read) {
     try {
@@ -234,7 +235,7 @@ class Reader {
 
   [[nodiscard]] bool begins_section() const { return token_.kind == Token::Kind::word && token_.text.ends_with('_'); }
 
-  // A list of words that are sections elsewhere; BS_ with its colon ends it.
+  // Skips a list of words that begin sections elsewhere. The list ends at BS_ with a colon.
   void skip_new_symbols() {
     sign(':');
     while (token_.kind == Token::Kind::word) {
@@ -245,7 +246,7 @@ class Reader {
     }
   }
 
-  // Names of nodes, on one line or several.
+  // Skips the names of nodes, which may be on several lines.
   void skip_nodes(int line) {
     skip_line(line);
     while (token_.kind == Token::Kind::word && !(first_in_line_ && begins_section())) advance();
@@ -255,13 +256,13 @@ class Reader {
     while (token_.kind != Token::Kind::end && token_.line == line) advance();
   }
 
-  // BO_ 256 FORCE: 8 SENSOR
+  // Reads a message, for example: BO_ 256 FORCE: 8 SENSOR
   void read_message(DbcFile& dbc, int line) {
     in_unassigned_ = false;
     if (dbc.messages.size() >= max_messages) throw error("no more than 4096 messages");
     DbcMessage& message = dbc.messages.emplace_back();
     message.line = line;
-    message.bytes = max_bytes_of_message;  // until it is known
+    message.bytes = max_bytes_of_message;  // until the length is read
     const auto id = static_cast<std::uint32_t>(integer("an identifier", 0, 0xFFFFFFFF));
     message.extended = (id & extended_bit) != 0;
     message.id = id & ~extended_bit;
@@ -283,7 +284,7 @@ class Reader {
     }
   }
 
-  // SG_ Fx m0 : 7|16@0- (0.01,0) [-300|300] "N" A,B
+  // Reads a signal, for example: SG_ Fx m0 : 7|16@0- (0.01,0) [-300|300] "N" A,B
   void read_signal(DbcMessage& message) {
     DbcSignal signal;
     signal.name = word("the signal's name");
@@ -314,7 +315,7 @@ class Reader {
     sign(']');
     signal.unit = std::string(string("the unit, in quotes"));
     skip_receivers();
-    // Branches of a multiplexer may reuse a name; sensors don't use them.
+    // Several branches of a multiplexer may use one name. Such signals are dropped, because sensors don't use them.
     const DbcSignal* same = message.find(signal.name);
     if (same != nullptr && same->multiplexed && signal.multiplexed) return;
     if (same != nullptr) throw error("a signal that isn't there yet: " + signal.name);
@@ -322,7 +323,7 @@ class Reader {
     message.signals.push_back(std::move(signal));
   }
 
-  // Separated by commas, by blanks, or not at all.
+  // Skips the receivers. They are separated by commas or blanks, or aren't separated.
   void skip_receivers() {
     bool goes_on = !first_in_line_;
     while (goes_on && (token_.kind == Token::Kind::word || at_sign(','))) {
@@ -332,13 +333,15 @@ class Reader {
     }
   }
 
-  // Intel: `start` is the lowest bit. Motorola: `start` is the highest bit, numbered bit 7 .. 0 of byte 0, then bit 15
-  // .. 8 of byte 1, and so on; the signal continues towards lower bits and then into the next byte.
+  // Computes the place of a signal from its start bit.
+  //   Intel      `start` is the signal's lowest bit.
+  //   Motorola   `start` is the highest bit. Bits are numbered 7 .. 0 in byte 0, then 15 .. 8 in byte 1, and so
+  //              on. The signal continues towards lower bits and then into the next byte.
   void place(const DbcMessage& message, DbcSignal& signal, int start, bool big_endian) const {
     NumberField& number = signal.number;
     number.big_endian = big_endian;
     number.byte = static_cast<std::size_t>(start / 8);
-    const int above = big_endian ? 7 - start % 8 : 0;  // bits of the first byte above the number
+    const int above = big_endian ? 7 - start % 8 : 0;  // bits of the first byte above the signal
     const int used = big_endian ? above + signal.length : start % 8 + signal.length;
     const int bytes = (used + 7) / 8;
     number.shift = big_endian ? 8 * bytes - used : start % 8;
@@ -348,7 +351,7 @@ class Reader {
     }
   }
 
-  // SIG_VALTYPE_ 256 Fx : 1;
+  // Reads the type of a signal, for example: SIG_VALTYPE_ 256 Fx : 1;
   void read_type(DbcFile& dbc) {
     const auto id = static_cast<std::uint32_t>(integer("an identifier", 0, 0xFFFFFFFF));
     const std::string name = word("a signal's name");
@@ -360,7 +363,7 @@ class Reader {
       for (DbcSignal& signal : message.signals) {
         if (signal.name != name || type == 0) continue;
         if (type == 1 && signal.length != 32) throw error("a float of 32 bits");
-        // Doubles are accepted here, but their 64 bits can't be used.
+        // A double is accepted here, but its 64 bits can't be used.
         if (type == 1) signal.number.kind = NumberKind::real;
         if (type == 2) signal.length = 64;
       }
@@ -373,7 +376,7 @@ class Reader {
   const std::filesystem::path& file_;
   Token token_;
   int line_ = 1;
-  bool first_in_line_ = false;  // whether token_ is the first on its line
+  bool first_in_line_ = false;  // whether token_ is the first token on its line
 };
 
 }  // namespace

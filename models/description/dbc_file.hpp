@@ -1,12 +1,15 @@
-// Reads messages and signals of a DBC file, the automotive industry's format: the place and scale of each number in a
-// frame.
+// Reads messages and signals of a DBC file, the automotive industry's format that states the place and scale of each
+// number in a frame.
 //
-// Reads BO_ (message), SG_ (signal), SIG_VALTYPE_ (float) and long names in BA_; skips other sections unchecked. Debian
-// 12 packages no DBC parser for C++, and for this flat list of words a small strict reader is less code than a grammar
-// library. An error in a message or its signals (bad syntax, a signal that doesn't fit, a repeated name) is noted with
-// its line and reported only to users of that message. Refused: bad syntax elsewhere, and files above 4 MiB, 4096
-// messages, or 512 signals in a message. Skipped: the pseudo-message (identifier C0000000h, or by its name) in which
-// some editors keep unassigned signals.
+// The reader reads BO_ (messages), SG_ (signals), SIG_VALTYPE_ (floats), and long names in BA_. It skips other sections
+// unchecked. It exists because Debian 12 has no package of a DBC parser for C++; for this flat list of words, a small
+// strict reader is less code than a grammar library needs. Three cases differ:
+// - An error in a message or its signals (bad syntax, a signal that doesn't fit, a repeated name) is stored with its
+//   line. Only users of this message get the error.
+// - Bad syntax elsewhere is refused, and so are files above 4 MiB, more than 4096 messages, and more than 512 signals
+//   in a message.
+// - The pseudo-message in which some editors store unassigned signals is skipped. It has the identifier C0000000h or a
+//   known name.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +24,11 @@ namespace proxarm::description {
 
 struct DbcSignal {
   std::string name;
-  std::string long_name;  // the full name if an editor cut it to 32 characters; otherwise empty
-  NumberField number;     // bytes relative to its frame
-  int length = 0;         // bits as stated; a signal of more than 32 can't be used, and number.bits is then 32
+  // The full name, if an editor cut `name` to 32 characters; otherwise empty.
+  std::string long_name;
+  NumberField number;  // its bytes are counted from the start of the signal's frame
+  // The number of bits that the file states. A signal of more than 32 bits can't be used; number.bits is then 32.
+  int length = 0;
   bool multiplexed = false;
   double factor = 1.0, offset = 0.0;
   std::string unit;
@@ -32,11 +37,11 @@ struct DbcSignal {
 struct DbcMessage {
   std::string name, long_name;
   std::uint32_t id = 0;
-  bool extended = false;  // bit 31 in the file
+  bool extended = false;  // bit 31 of the identifier in the file
   std::uint8_t bytes = 0;
   int line = 0;
   std::vector<DbcSignal> signals;
-  std::string mistake;  // the first error, with file and line; empty: none
+  std::string mistake;  // the first error, with file and line; empty: no error
 
   [[nodiscard]] const DbcSignal* find(std::string_view signal) const noexcept;
 };
@@ -44,12 +49,12 @@ struct DbcMessage {
 struct DbcFile {
   std::filesystem::path file;
   std::vector<DbcMessage> messages;
-  std::vector<std::string> remarks;  // errors of messages, one per line
+  std::vector<std::string> remarks;  // the errors of messages, one per line
 
   [[nodiscard]] const DbcMessage* find(std::string_view message) const noexcept;
 };
 
-// `file` is for error messages. Both throw SetupError.
+// Parse a DBC text, or read and parse a file. `file` appears in error messages. Both throw SetupError.
 [[nodiscard]] DbcFile parse_dbc(std::string_view text, const std::filesystem::path& file);
 [[nodiscard]] DbcFile load_dbc(const std::filesystem::path& file);
 

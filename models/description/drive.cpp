@@ -48,9 +48,9 @@ SimulatedDrive read_simulation(const YamlNode& node) {
   return s;
 }
 
-// Required for an incremental encoder, refused for an absolute one.
+// Reads `homing`, which is required for an incremental encoder and refused for an absolute encoder.
 std::optional<HomingDescription> read_homing(const YamlNode& node, const DriveDescription& drive) {
-  // Drives on Modbus can't be homed from here.
+  // This program can't home drives on Modbus.
   const bool incremental = (drive.on_can() ? node.choice_or("encoder", "absolute", {"absolute", "incremental"})
                                            : node.choice_or("encoder", "absolute", {"absolute"})) == "incremental";
   if (!incremental) {
@@ -70,7 +70,7 @@ std::optional<HomingDescription> read_homing(const YamlNode& node, const DriveDe
   return homing;
 }
 
-// 607Ah and 6064h have 32 bits: the whole range must fit them.
+// Checks that the counts of the whole range fit into the 32 bits of 607Ah and 6064h.
 void check_counts(const YamlNode& node, const DriveDescription& drive) {
   for (const double angle : drive.range_rad) {
     const double counts = drive.offset_counts + drive.counts_per_rad() * angle;
@@ -83,7 +83,7 @@ void check_counts(const YamlNode& node, const DriveDescription& drive) {
   }
 }
 
-// "0x60C1:02", or "0x607A" for sub-index 0.
+// Reads an object: "0x60C1:02", or "0x607A" for sub-index 0.
 std::uint32_t read_object(const YamlNode& node, const std::string& key) {
   const std::string text = text_like(node, key,
                                      {"0x[1-9A-Fa-f][0-9A-Fa-f]{3}(:[0-9A-Fa-f]{1,2})?",
@@ -119,7 +119,7 @@ std::vector<DriveFeedback> read_feedback(const YamlNode& node) {
   return feedback;
 }
 
-// A torque in counts, or an angle in counts of a second encoder.
+// Reads either a torque in counts, or an angle in counts of a second encoder.
 GearTorque read_gear_torque(const YamlNode& node) {
   GearTorque torque;
   torque.object = read_object(node, "object");
@@ -136,7 +136,8 @@ GearTorque read_gear_torque(const YamlNode& node) {
   return torque;
 }
 
-// TPDO1 begins with statusword, position and, in mode cst, the actual torque.
+// Checks that TPDO1 has room for all objects. TPDO1 begins with statusword, position and, in mode cst, the actual
+// torque.
 void require_room_in_tpdo(const YamlNode& node, const DriveDescription& drive) {
   int bytes = drive.mode == "cst" ? 8 : 6;
   for (const DriveFeedback& more : drive.feedback) bytes += more.bits / 8;
@@ -164,7 +165,8 @@ std::vector<StartUpWrite> read_writes(const YamlNode& node) {
   return writes;
 }
 
-// If a drive shows its mode only when enabled, the cycle must read it.
+// Checks that the mode is in the feedback. If a drive shows its mode only when it is enabled, the cycle must read the
+// mode.
 void require_mode_in_feedback(const YamlNode& node, const DriveDescription& drive) {
   const auto is_display = [&](const DriveFeedback& more) {
     return more.object == drive.objects.mode_display && more.bits == 8;

@@ -13,7 +13,8 @@ namespace {
 constexpr Range stiffness_range = between(0.0, 1e5), damping_range = between(0.0, 1e4);
 constexpr Range place_range = between(-100.0, 100.0), force_range = between(-1e4, 1e4);
 
-// `FILE.csv` with these names in its header, or `{file: FILE.csv, columns: {x_m: px}}` for other names.
+// Reads a key that is either `FILE.csv`, with these columns in the file's header, or `{file: FILE.csv, columns: {x_m:
+// px}}` with other column names.
 std::vector<TimedVector> read_data(const YamlNode& root, const char* key, CsvColumns columns, Range range,
                                    HandDescription& hand) {
   const YamlNode node = root.at(key);
@@ -26,7 +27,7 @@ std::vector<TimedVector> read_data(const YamlNode& root, const char* key, CsvCol
   return load_csv(hand.data_files.back(), columns, range);
 }
 
-// The tool begins where the trajectory does, wherever that was recorded.
+// Shifts the trajectory so that it begins at zero, because the tool begins where the trajectory begins.
 void begin_at_zero(std::vector<TimedVector>& trajectory) {
   const std::array<double, 3> first = trajectory.front().value;
   for (TimedVector& sample : trajectory) {
@@ -44,7 +45,8 @@ void read_hand_data(const YamlNode& root, HandDescription& hand) {
 }
 constexpr Range turning_range = between(0.0, 1e4);
 
-// Without a grip on the orientation, the hand would silently ignore intended turns.
+// Checks that intended turns come with a grip on the orientation. Without this grip, the hand would silently ignore the
+// turns.
 void require_turning_grip(const YamlNode& root, const HandDescription& hand) {
   if (hand.twists()) return;
   const bool wanted = std::any_of(hand.waypoints.begin(), hand.waypoints.end(),

@@ -19,7 +19,7 @@ std::uint16_t read_register(const YamlNode& node, std::string_view key) {
 
 int read_width(const YamlNode& node) { return static_cast<int>(integer_of_or(node, "registers", 2, {1, 2})); }
 
-// A value that fits one or two registers, signed or unsigned.
+// Reads a value that fits into one or two registers, signed or unsigned.
 std::int64_t read_value(const YamlNode& node, std::string_view key, std::int64_t otherwise, int registers,
                         bool is_signed = true) {
   const std::int64_t low = !is_signed ? 0 : registers == 1 ? -0x8000 : std::numeric_limits<std::int32_t>::min();
@@ -42,7 +42,7 @@ ModbusValue read_command_value(const YamlNode& node) {
   if (v.signal != Signal::position && v.signal != Signal::speed) {
     refuse_key(node, "scale", "a scale for signal: position or speed only");
   }
-  v.value = read_value(node, "value", 0, v.registers, v.signal != Signal::speed);  // a lowest speed isn't negative
+  v.value = read_value(node, "value", 0, v.registers, v.signal != Signal::speed);  // the lowest speed isn't negative
   v.scale = node.number_or("scale", 1.0, above(0.0, 1e9));
   return v;
 }
@@ -63,7 +63,7 @@ int count_of(const ModbusDriveDescription& drive, ModbusValue::Signal signal) {
                                         [&](const ModbusValue& value) { return value.signal == signal; }));
 }
 
-// Registers that are written must not overlap each other or those that are read.
+// A block of registers. Registers that are written must not overlap each other or registers that are read.
 struct Registers {
   int first, count;
   std::string name;
@@ -110,7 +110,8 @@ void read_control(const YamlNode& node, ModbusDriveDescription& drive) {
   if (drive.control_on == drive.control_off) throw node.error_at("on", "a control word other than `off`");
 }
 
-// Masks may name only bits of the status word, and a fault's bits must be clear in the ready and enabled values.
+// Checks that masks contain only bits of the status word, and that the bits of a fault are clear in the values for
+// ready and enabled.
 void check_status(const YamlNode& node, const ModbusDriveDescription& drive) {
   const std::uint32_t bits = drive.status.registers == 1 ? 0xFFFF : 0xFFFFFFFF;
   const std::tuple<const char*, std::uint32_t, std::uint32_t> masks[] = {

@@ -32,7 +32,8 @@ void require_limits(const YamlNode& limits, const CellLimits& given) {
   require_there(limits, "workspace_m", "the box that the tool stays in");
 }
 
-// A switch that is squeezed through ends the session: it is a reflex, not a wish to pause.
+// Refuses the reaction hold for a switch that is squeezed through. Squeezing is a reflex, not a wish to pause, so it
+// must end the session.
 void require_stop_when_squeezed(const YamlNode& root, const Cell& cell) {
   const auto chosen = cell.supervision.reactions.find("enabling_squeezed");
   if (chosen == cell.supervision.reactions.end() || chosen->second != "hold") return;

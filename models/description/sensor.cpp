@@ -13,8 +13,9 @@ namespace {
 
 using Matrix = std::array<std::array<double, 6>, 6>;
 
-// The condition number of a 6×6 matrix, to judge whether its inverse keeps digits of single precision: by Gauss-Jordan
-// inversion with partial pivoting, in the ∞-norm of the row-scaled matrix (rows differ only by their units).
+// Returns the condition number of a 6×6 matrix, which tells whether the matrix's inverse keeps digits in single
+// precision. Computes it by Gauss-Jordan inversion with partial pivoting, in the ∞-norm of the row-scaled matrix. (Rows
+// are scaled because they differ in their units.)
 double condition(Matrix a) {
   Matrix inverse{};
   double norm = 0.0, inverse_norm = 0.0;
@@ -56,7 +57,8 @@ SensorSimulation read_simulation(const YamlNode& node) {
     const auto row = rows[i].as_numbers(6, 6, between(-1e9, 1e9));
     for (std::size_t j = 0; j < 6; ++j) s.matrix[i][j] = static_cast<double>(static_cast<float>(row[j]));
   }
-  // Above 1e4, single-precision coefficients (6e-8) leave less than three digits of the smallest component.
+  // Above a condition of 1e4, coefficients in single precision (6e-8) leave less than three digits of the smallest
+  // component.
   if (const double c = condition(s.matrix); !(c < 1e4)) {
     throw node.error_at("matrix", "an invertible matrix of condition below 10000",
                         "one of condition " + number_text(c));
@@ -70,7 +72,7 @@ SensorSimulation read_simulation(const YamlNode& node) {
   return s;
 }
 
-constexpr double drifting_share = 0.01;  // of the range
+constexpr double drifting_share = 0.01;  // fraction of the range
 
 }  // namespace
 

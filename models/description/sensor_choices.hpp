@@ -1,5 +1,5 @@
-// A cell's choices for its own sensor, beyond the sensor's file: identifiers, numbers, divisors and ranges of this
-// unit.
+// Contains a cell's choices for its sensor, in addition to the sensor's file: identifiers, numbers, divisors and ranges
+// of this one sensor.
 #pragma once
 
 #include <array>
@@ -11,19 +11,19 @@
 
 namespace proxarm::description {
 
-// A value for one of the `settings` of the sensor's file (sensor_protocol.hpp).
+// The value of one of the `settings` in the sensor's file (sensor_protocol.hpp).
 struct SensorSettingChoice {
   std::string name{};
   std::int64_t value = 0;
-  int line = 0;  // of the cell's file
+  int line = 0;  // line in the cell's file
 
   bool operator==(const SensorSettingChoice&) const = default;
 };
 
 struct SensorChoices {
-  std::filesystem::path file{};  // the cell's, for error messages
+  std::filesystem::path file{};  // path of the cell's file, for error messages
   std::vector<SensorSettingChoice> settings{};
-  std::optional<std::array<double, 3>> force_range_N{}, torque_range_Nm{};  // replace those of the sensor's file
+  std::optional<std::array<double, 3>> force_range_N{}, torque_range_Nm{};  // replace the ranges in the sensor's file
 
   bool operator==(const SensorChoices&) const = default;
 };

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::array<const char*, 6> components{"fx", "fy", "fz", "tx", "ty", "tz"};
 
-// A value that a sensor's file leaves to the cell: the cell's value or the default.
+// A value that a sensor's file leaves to the cell. It is the cell's value or the default.
 struct Setting {
   std::int64_t value = 0;
   bool is_identifier = false;
@@ -28,7 +28,7 @@ struct Reader {
   std::map<std::string, Setting> settings{};
   bool big_endian = true;
   std::optional<DbcFile> dbc{};
-  std::vector<const DbcMessage*> messages{};  // for each frame; null if the frame states its own identifier
+  std::vector<const DbcMessage*> messages{};  // one for each frame; null if the frame states its own identifier
 
   void read_settings() {
     if (const auto node = root.find_map("settings")) {
@@ -75,7 +75,7 @@ struct Reader {
     return settings.empty() || !node.is_scalar() ? settings.end() : settings.find(node.as_string());
   }
 
-  // A number, or the value of the setting with this name.
+  // Returns a number, or the value of the setting that `node` names.
   [[nodiscard]] std::int64_t number_of(const YamlNode& node, std::int64_t min, std::int64_t max) const {
     const auto named = setting_named(node);
     if (named == settings.end()) return node.as_integer(min, max);
@@ -85,7 +85,8 @@ struct Reader {
                      named->first + " = " + std::to_string(value));
   }
 
-  // The signal of this name in the DBC file; `at` becomes the first byte of its frame in the sample.
+  // Returns the signal with the name in `node` from the DBC file. `at` becomes the first byte of the signal's frame in
+  // the sample.
   [[nodiscard]] const DbcSignal* find_signal(const YamlNode& node, std::size_t& at) const {
     const std::string name = node.string("signal");
     at = 0;
@@ -119,7 +120,7 @@ struct Reader {
            "big_endian";
   }
 
-  // Reads the place of a number. Throws unless it is within the first `within` bytes.
+  // Reads the place of a number. Throws SetupError unless the number is within the first `within` bytes.
   [[nodiscard]] NumberField read_number(const YamlNode& node, std::size_t within) const {
     NumberField number;
     if (node.has("signal")) {
@@ -130,7 +131,7 @@ struct Reader {
     }
     if (protocol.registers) {
       const std::int64_t first = protocol.registers->at, last = first + protocol.registers->count - 1;
-      within = 2 * static_cast<std::size_t>(protocol.registers->count);  // the frame may be longer
+      within = 2 * static_cast<std::size_t>(protocol.registers->count);  // the frame may be longer than the registers
       number.byte = 2 * static_cast<std::size_t>(node.integer("register", first, last) - first);
       number.bits = static_cast<int>(node.integer_or("bits", 16, 1, 32));
     } else {
@@ -153,7 +154,7 @@ struct Reader {
     return number;
   }
 
-  // Settings that are identifiers must differ.
+  // Notes that a setting is an identifier. Throws SetupError if another identifier has the same value.
   void note_identifier(const std::string& name) {
     Setting& setting = settings[name];
     setting.is_identifier = true;
@@ -212,7 +213,8 @@ struct Reader {
       frame.id = read_id(node);
     }
     const auto capacity = static_cast<std::int64_t>(protocol.frame_capacity());
-    const std::vector<std::int64_t> lengths{1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};  // CAN FD's
+    // The possible lengths of CAN FD frames.
+    const std::vector<std::int64_t> lengths{1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};
     const auto bytes = named ? std::int64_t{frame.bytes} : integer_of(node, "bytes", lengths);
     if (bytes < 1 || bytes > capacity) {
       throw node.error_at(named ? "message" : "bytes", "one of 1 to " + std::to_string(capacity) + " bytes");
@@ -251,7 +253,7 @@ struct Reader {
     return signal;
   }
 
-  // The registers count as one frame that is long enough; its identifier is unused.
+  // Reads the registers. They count as one frame that is long enough for all of them; the frame's identifier is unused.
   void read_registers() {
     const YamlNode node = root.map("registers");
     SensorRegisters registers;
@@ -272,7 +274,7 @@ struct Reader {
     if (root.has("registers")) return read_registers();
     for (const YamlNode& node : root.list("frames", 1, max_sample_frames)) protocol.frames.push_back(read_frame(node));
     if (protocol.sample_bytes() > max_sample_bytes) throw root.error_at("frames", "up to 256 bytes in all");
-    // Frames with the same identifier must differ in another way.
+    // The first frame must differ from all other frames by its identifier, its length or its first bytes.
     for (std::size_t i = 1; i < protocol.frames.size(); ++i) {
       const SampleFrame &first = protocol.frames[0], &other = protocol.frames[i];
       if (first.id == other.id && first.bytes == other.bytes && first.starts_with.empty()) {
@@ -389,14 +391,15 @@ struct Reader {
       throw root.error_at("rate_Hz", "a rate whose code, divides_Hz / rate_Hz, is from 1 to " +
                                          number_text(protocol.rate->value->highest()));
     }
-    // A sensor's crystal deviates by up to 1 %; more is a mistake.
+    // A sensor's crystal deviates by up to 1 %; a larger difference is a mistake in the file.
     if (std::abs(protocol.rate->divides_Hz / value - protocol.rate_Hz) > 0.01 * protocol.rate_Hz) {
       throw root.error_at("rate_Hz", "a rate that the sensor has: " + number_text(protocol.rate->divides_Hz / value) +
                                          " is the nearest");
     }
   }
 
-  // The bit of the sample that holds bit j of a number: `shift + j` bits above the lowest bit of its lowest byte.
+  // Returns the bit of the sample that holds bit j of a number. It is `shift + j` bits above the lowest bit of the
+  // number's lowest byte.
   [[nodiscard]] static std::size_t bit_of(const NumberField& number, int j) {
     const auto above = static_cast<std::size_t>(number.shift + j);
     return 8 * (number.big_endian ? number.byte + number.bytes() - 1 - above / 8 : number.byte + above / 8) + above % 8;

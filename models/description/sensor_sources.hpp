@@ -1,8 +1,8 @@
-// The sources of a sensor's file, from which its identifiers, bytes, scales, states and commands come. For readers and
-// `proxarm check`.
+// Reads the sources of a sensor's file: the documents that its identifiers, bytes, scales, states and commands come
+// from. The sources are for people who read the file, and for `proxarm check`.
 //
 //   sources: ["the maker's manual, 1.82, page 9: identifiers and commands", ...]
-//   one_source_only: "the rate command: a driver of others alone"        facts without a second source
+//   one_source_only: "the rate command: a driver of others alone"        facts that have no second source
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ struct SensorSources {
   std::string one_source_only;  // empty: each fact has two sources
 };
 
-// Throws SetupError. Returns empty fields if the file has no such keys.
+// Returns the sources, or empty fields if the file has no such keys. Throws SetupError.
 SensorSources read_sensor_sources(const YamlNode& root);
 
 }  // namespace proxarm::description

@@ -60,7 +60,7 @@ SupervisionDescription read_supervision(const YamlNode& node) {
 
 namespace {
 
-// Precondition: `input` already holds the place of the middle contact.
+// Reads `three_position`. Precondition: `input` already contains the place of the middle contact.
 void read_three_position(const YamlNode& node, EnablingInputDescription& input) {
   const auto contact = node.find_map("three_position");
   if (!contact) return;

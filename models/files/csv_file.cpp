@@ -21,7 +21,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
-// Without the quotes that spreadsheets put around names.
+// Returns the field without the quotes that spreadsheets put around names.
 std::string_view unquoted(std::string_view field) {
   const bool quoted = field.size() >= 2 && field.front() == '"' && field.back() == '"';
   return quoted ? field.substr(1, field.size() - 2) : field;
@@ -33,7 +33,7 @@ class Reader {
     if (rest_.starts_with(byte_order_mark)) rest_.remove_prefix(byte_order_mark.size());
   }
 
-  // The fields of the next line that isn't empty or a comment; false at the end.
+  // Reads the fields of the next line that is neither empty nor a comment. Returns false at the end of the text.
   bool next(std::vector<std::string_view>& fields) {
     while (!rest_.empty()) {
       const std::size_t end = std::min(rest_.find('\n'), rest_.size());
@@ -77,14 +77,14 @@ class Reader {
   char separator_ = '\0';
 };
 
-// A column's number, from 1; nullopt for a name.
+// Returns a column's number, from 1, or nullopt if the column is a name.
 std::optional<std::size_t> number_of(const std::string& column) {
   const auto number = strict_integer(column);
   if (!number || *number < 1 || *number > 10'000) return std::nullopt;
   return static_cast<std::size_t>(*number);
 }
 
-// The columns' places in a row, from 0.
+// Returns the places of the columns in a row, counted from 0.
 std::array<std::size_t, 4> places(const Reader& reader, const CsvColumns& columns,
                                   const std::vector<std::string_view>& header) {
   std::array<std::size_t, 4> at{};
@@ -130,7 +130,7 @@ std::vector<TimedVector> parse_csv(std::string_view text, const std::filesystem:
   if (!more) throw SetupError({.file = file.string(), .found = "no line", .expected = "a header and rows of numbers"});
   const bool all_numbers = std::all_of(columns.begin(), columns.end(), [](const auto& c) { return number_of(c); });
   const std::array<std::size_t, 4> at = places(reader, columns, row);
-  // A first line without any number is a header, even if its names aren't needed.
+  // A first line without any number is a header, even if the names in it aren't needed.
   const bool header =
       !all_numbers || std::none_of(row.begin(), row.end(), [](const auto& f) { return strict_number(f); });
   if (header) more = reader.next(row);

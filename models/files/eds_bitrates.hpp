@@ -1,4 +1,4 @@
-// The bitrates of a device according to its EDS file: [DeviceInfo] BaudRate_10 to BaudRate_1000, in kbit/s (CiA 306-1).
+// Reads the bitrates that a device's EDS file lists: [DeviceInfo] BaudRate_10 to BaudRate_1000, in kbit/s (CiA 306-1).
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,8 @@
 
 namespace proxarm::description {
 
-// Throws SetupError, with file and line, if the file lists bitrates but not this one (bit/s). Also throws as
-// parse_eds() does for values that aren't numbers.
+// Throws SetupError, with file and line, if the file lists bitrates but not `bitrate` (bit/s), or if it contains a
+// value that isn't a number where one is required.
 void require_bitrate(std::string_view eds_text, const std::filesystem::path& file, std::int64_t bitrate);
 void require_bitrate(const std::filesystem::path& file, std::int64_t bitrate);
 

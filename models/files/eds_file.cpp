@@ -28,7 +28,7 @@ struct DataType {
   bool is_signed = false;
 };
 
-// The type by its number in CiA 301, table 44; 0 bits if it isn't a number of 1 to 64 bits.
+// Returns the type with this number in CiA 301, table 44. It has 0 bits if it isn't a number of 1 to 64 bits.
 DataType data_type(std::int64_t number) noexcept {
   constexpr DataType types[] = {{0x01, 1},        {0x02, 8, true},  {0x03, 16, true}, {0x04, 32, true}, {0x05, 8},
                                 {0x06, 16},       {0x07, 32},       {real32, 32},     {0x10, 24, true}, {0x11, 64},
@@ -40,7 +40,8 @@ DataType data_type(std::int64_t number) noexcept {
   return {};
 }
 
-// "$NODEID+0x180" for a known node, in any case and order, with spaces or in brackets: a sum with $NODEID exactly once.
+// Returns the value of a text such as "$NODEID+0x180", for a known node. The text is a sum that contains $NODEID
+// exactly once, in upper or lower case, in any order, with spaces or in brackets.
 std::optional<std::int64_t> relative_value(const std::string& text, int node) {
   std::string sum = lower(text);
   std::erase_if(sum, [](unsigned char c) { return std::isspace(c) != 0; });
@@ -61,7 +62,8 @@ std::optional<std::int64_t> relative_value(const std::string& text, int node) {
   return nodes == 1 ? std::optional(total) : std::nullopt;
 }
 
-// An object's value as bits. A signed value may be a decimal, or the bits of its type or of a wider one.
+// Returns an object's value as bits. A signed value may be written as a decimal number, or as the bits of its type or
+// of a wider type.
 std::optional<std::uint32_t> value_of(const IniFile& ini, const std::string& section, const std::string& key,
                                       const DataType& type, std::optional<int> node) {
   if (type.bits == 0 || type.bits > 32) return std::nullopt;
@@ -88,7 +90,7 @@ std::optional<std::uint32_t> value_of(const IniFile& ini, const std::string& sec
   return static_cast<std::uint32_t>(*found & most);
 }
 
-// Index and sub-index of a section named "1a00" or "1a00sub1"; nullopt for any other section.
+// Returns index and sub-index of a section named "1a00" or "1a00sub1", or nullopt for any other section.
 std::optional<std::uint32_t> object_of(const std::string& section, bool& has_sub) {
   constexpr const char* hex = "0123456789abcdef";
   const std::size_t sub = section.find("sub");
@@ -135,7 +137,7 @@ class Reader {
                           .message = keys.mistake});
       }
       const bool compound = !has_sub && (kind == array || kind == record);
-      if (compound && alike == 0) return;  // its sub-indices have separate sections
+      if (compound && alike == 0) return;  // the object's sub-indices have separate sections
       read(object, section, kind);
     } catch (const SetupError& error) {
       object.mistake = error.what();
@@ -159,7 +161,7 @@ class Reader {
     const DataType type = data_type(number.value_or(0));
     object.type = type.number;
     object.bits = type.bits;
-    // A value to be set must be readable, whatever else is wrong here.
+    // A value that a DCF sets must be readable, even if something else in this object is wrong.
     object.value = value_that_is_set(section, "ParameterValue", type);
     const std::string access = lower(ini_.text(section, "AccessType"));
     constexpr const char* known[] = {"ro", "wo", "rw", "rwr", "rww", "const"};
@@ -192,7 +194,7 @@ class Reader {
     }
   }
 
-  // Some tools write two equal limits for "no limits".
+  // Reads the limits of an object. Two equal limits count as no limits, because some tools write this.
   void read_limits(EdsObject& object, const std::string& section, const DataType& type) {
     if (type.number == real32) return;
     const auto limit = [&](const char* key) -> std::optional<std::int64_t> {
@@ -206,7 +208,8 @@ class Reader {
     if (object.low && object.high && *object.low >= *object.high) object.low = object.high = std::nullopt;
   }
 
-  // A value that a DCF sets. If it can't be read, the whole file fails: the drive wouldn't be set as the file says.
+  // Returns a value that a DCF sets. If it can't be read, the whole file is refused, because the drive wouldn't get all
+  // values of the file.
   std::optional<std::uint32_t> value_that_is_set(const std::string& section, const std::string& key,
                                                  const DataType& type) {
     try {
@@ -217,7 +220,7 @@ class Reader {
     }
   }
 
-  // [1016Value]: 1=0x7F0064, by sub-index.
+  // Sets values from a section such as [1016Value] with 1=0x7F0064, by sub-index.
   void set_compact(const std::string& section, const IniFile::Section& keys, std::uint32_t address) {
     for (const auto& [key, text] : keys.values) {
       if (key == "nrofentries") continue;

@@ -38,7 +38,7 @@ std::optional<std::int64_t> parse(std::string_view value) {
   return negative ? -size : size;
 }
 
-// Removes control characters from a foreign file's name, which a terminal would obey.
+// Removes control characters from a name in a foreign file, because a terminal would obey them.
 std::string printable(std::string_view name) {
   const std::string quoted = in_quotes(name.substr(0, 80));
   return quoted.substr(1, quoted.size() - 2);

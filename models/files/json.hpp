@@ -1,5 +1,5 @@
-// Writes and reads JSON through a plain class. It hides the library (nlohmann's), whose templates would double the
-// compile time of each source that includes them.
+// Writes and reads JSON through a plain class. The class hides the library (nlohmann's), whose templates would double
+// the compile time of each source that includes them.
 #pragma once
 
 #include <concepts>
@@ -14,7 +14,7 @@
 
 namespace proxarm::description {
 
-// A value: null, boolean, number, text, list, or an object whose keys keep their order.
+// A JSON value: null, boolean, number, text, list, or an object, whose keys keep their order.
 //
 //   Json json{{"cell", name}, {"stops", Json::array()}};
 //   json["stops"].push_back({{"time_s", 0.1}, {"at_rest", true}});
@@ -34,43 +34,45 @@ class Json {
   template <class T>
   Json(const std::vector<T>& values) : kind_(Kind::list), items_(values.begin(), values.end()) {}
 
-  // An object if every item is a pair that begins with a text; otherwise a list.
+  // Makes an object if every item is a pair that begins with a text; otherwise makes a list.
   Json(std::initializer_list<Json> items);
 
   static Json array() { return of_kind(Kind::list); }
   static Json object() { return of_kind(Kind::object); }
 
-  // The value of a key; a missing one is created as null. Turns null into an object. Precondition: null or an object.
+  // Returns the value of a key. If the key is missing, it is added with the value null. Turns a null value into an
+  // object. Precondition: this value is null or an object.
   Json& operator[](std::string_view key);
 
-  // Turns null into a list. Precondition: null or a list.
+  // Appends to a list. Turns a null value into a list. Precondition: this value is null or a list.
   void push_back(Json value);
 
-  // Precondition: a list that isn't empty.
+  // Precondition: this value is a list that isn't empty.
   [[nodiscard]] Json& back() noexcept { return items_.back(); }
 
-  // Precondition: both are objects.
+  // Takes the keys and values of `other`. Precondition: both values are objects.
   void update(const Json& other);
 
-  // The text on one line, or with `indent` spaces per level. Invalid UTF-8 is replaced; numbers that aren't finite
-  // become null.
+  // Returns the text on one line or, with `indent` ≥ 0, with this number of spaces per level. Invalid UTF-8 is
+  // replaced, and numbers that aren't finite become null.
   [[nodiscard]] std::string dump(int indent = -1) const;
 
-  // nullopt if the text isn't JSON.
+  // Returns nullopt if the text isn't JSON.
   static std::optional<Json> parse(std::string_view text);
 
-  // The value of a key; nullptr if it is missing or this isn't an object.
+  // Returns the value of a key, or nullptr if the key is missing or this value isn't an object.
   [[nodiscard]] const Json* find(std::string_view key) const noexcept;
 
-  // The text, or whole number, of a key; nullopt if it is missing or of another kind.
+  // Return the text or the whole number of a key, or nullopt if the key is missing or its value has another kind.
   [[nodiscard]] std::optional<std::string> text_of(std::string_view key) const;
   [[nodiscard]] std::optional<std::int64_t> integer_of(std::string_view key) const noexcept;
 
-  [[nodiscard]] const std::vector<Json>& items() const noexcept { return items_; }  // of a list or an object
+  // Returns the items of a list, or the values of an object.
+  [[nodiscard]] const std::vector<Json>& items() const noexcept { return items_; }
 
  private:
   enum class Kind : std::uint8_t { null, truth, integer, real, text, list, object };
-  friend struct JsonLibrary;  // json.cpp: converts to and from the library's values
+  friend struct JsonLibrary;  // in json.cpp; converts to and from the library's values
 
   static Json of_kind(Kind kind) {
     Json value;
@@ -83,7 +85,7 @@ class Json {
   std::int64_t integer_ = 0;
   double real_ = 0.0;
   std::string text_;
-  std::vector<std::string> keys_;  // of an object, one per item
+  std::vector<std::string> keys_;  // the keys of an object, one per item
   std::vector<Json> items_;
 };
 

@@ -1,4 +1,4 @@
-// The line of a key in a YAML file, for mistakes found after the file was read.
+// Finds the line of a key in a YAML file, for mistakes that are found after the file was read.
 #pragma once
 
 #include <filesystem>
@@ -6,8 +6,8 @@
 
 namespace proxarm::description {
 
-// The line of a key, dotted from the root, or of its nearest existing parent; 0: none exists. Precondition: the file
-// has been read without a mistake.
+// Returns the line of a key. `dotted` is the key's path from the root. If the key doesn't exist, returns the line of
+// its nearest parent that exists, or 0 if none exists. Precondition: the file has been read without a mistake.
 int line_of_key(const std::filesystem::path& file, const std::string& dotted);
 
 }  // namespace proxarm::description

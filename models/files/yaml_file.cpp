@@ -19,7 +19,7 @@ struct Unit {
   std::string_view suffix, unit;
 };
 
-// Longer suffixes first: the first match counts.
+// Longer suffixes come first, because the first suffix that matches is used.
 constexpr Unit units[] = {
     {"_Nms_per_rad", "Nms/rad"},
     {"_m_per_s2", "m/s²"},
@@ -90,7 +90,7 @@ std::string size_text(std::size_t min, std::size_t max, std::string_view noun) {
 
 std::vector<std::string> to_vector(std::initializer_list<std::string> words) { return words; }
 
-using Note = YamlFact::Kind;  // facts for a journal
+using Note = YamlFact::Kind;  // the kinds of facts for a journal
 
 Range whole(std::int64_t min, std::int64_t max) { return between(static_cast<double>(min), static_cast<double>(max)); }
 
@@ -102,14 +102,14 @@ void note_default(const YamlNode& node, std::string_view key, const YamlFact& fa
 }  // namespace
 
 std::string unit_of_key(std::string_view key) {
-  // Only the end of a key can state a unit; a frame there (force_S) isn't one.
+  // Only the end of a key can state a unit. If a frame is at the end (force_S), the key states no unit.
   for (const Unit& unit : units) {
     if (key.ends_with(unit.suffix)) return std::string(unit.unit);
   }
   return {};
 }
 
-// Notes a fact about this value in the journal, if any.
+// Passes a fact about this value to the journal, if there is one.
 void YamlNode::Item::heard(const std::shared_ptr<const Document>& document, const YamlFact& fact) const {
   if (parent != nullptr) note(YamlNode(document, *parent), key, fact);
 }
@@ -147,7 +147,7 @@ std::string YamlNode::found() const {
     case Item::Kind::scalar:
       break;
   }
-  // Shows numbers as written, everything else in quotes.
+  // Shows numbers as they are written, and everything else in quotes.
   const bool number = !item_->is_quoted && strict_number(item_->text).has_value();
   return number && item_->text.size() < 60 ? item_->text : in_quotes(item_->text);
 }
@@ -221,7 +221,7 @@ void YamlNode::default_to(std::string_view key, const YamlNode& other) const {
 }
 
 SetupError YamlNode::missing(std::string_view key, std::string expected) const {
-  // Names the parent's line or, if one of its keys looks like a misspelling of this one, that key.
+  // Names the parent's line. If a key in the parent looks like a misspelling of this key, names that key as well.
   std::string found = "nothing", advice;
   for (const Item* map = item_; map != nullptr; map = map->defaults) {
     std::vector<std::string> slips;
@@ -370,7 +370,8 @@ std::filesystem::path YamlNode::existing_file(std::string_view key) const {
   if (!std::filesystem::exists(status)) throw fails("doesn't exist");
   if (std::filesystem::is_directory(status)) throw fails("is a folder");
   if (!std::filesystem::is_regular_file(status))
-    throw fails("is no file to read");  // reading a pipe could block forever
+    // Reading a pipe could block forever.
+    throw fails("is no file to read");
   if (!std::ifstream(file).good()) throw fails("can't be read; look at its permissions");
   return file;
 }
@@ -452,7 +453,7 @@ std::array<double, 3> YamlNode::as_vec3(Range range) const {
   return {values[0], values[1], values[2]};
 }
 
-// The map beside or within this one that knows that key; null: none.
+// Returns the map in the parent or in this map whose known keys include `wanted`, or null if no map does.
 const YamlNode::Item* YamlNode::Item::map_with(std::string_view wanted) const {
   for (const Item* around : {parent, this}) {
     if (around == nullptr || around->kind != Kind::map) continue;

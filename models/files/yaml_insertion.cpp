@@ -8,7 +8,8 @@
 namespace proxarm::description {
 namespace {
 
-// The place of a line's first character, lines counted from 0; after the last line the text's size.
+// Returns the place of a line's first character. Lines are counted from 0; after the last line, the place is the size
+// of the text.
 std::size_t line_begin(const std::string& text, int line) {
   std::size_t at = 0;
   for (int i = 0; i < line && at < text.size(); ++i) at = std::min(text.find('\n', at), text.size() - 1) + 1;
@@ -35,7 +36,7 @@ std::optional<YAML::Node> map_at(const std::string& text, const std::vector<Yaml
   return node.IsMap() ? std::optional(node) : std::nullopt;
 }
 
-// The last key with a plain value on its line.
+// Returns the mark of the last key that has a plain value on its line.
 std::optional<YAML::Mark> last_line(const YAML::Node& map) {
   std::optional<YAML::Mark> last;
   for (const auto& entry : map) {
@@ -49,7 +50,8 @@ std::size_t place_of(const std::string& text, const YAML::Mark& mark) {
   return std::min(line_begin(text, mark.line) + static_cast<std::size_t>(mark.column), text.size());
 }
 
-// The first key stays first: people and programs know a list's member by it.
+// Inserts an entry after the first key. The first key must stay first, because people and programs recognise a list's
+// member by it.
 bool insert_in_braces(std::string& text, const YAML::Node& map, const std::string& entry) {
   const std::size_t begin = place_of(text, map.Mark());
   if (begin >= text.size() || text[begin] != '{') return false;
@@ -89,7 +91,7 @@ bool insert_key(std::string& text, const std::vector<YamlStep>& path, const std:
   if (!last) return false;
   const std::size_t begin = line_begin(text, last->line), next = line_begin(text, last->line + 1);
   const bool whole = next > begin && text[next - 1] == '\n';
-  // Keeps line ends of two characters.
+  // If the file's lines end in two characters ("\r\n"), the new line does too.
   const std::string end = whole && next - begin > 1 && text[next - 2] == '\r' ? "\r\n" : "\n";
   text.insert(
       next, (whole ? "" : end) + std::string(static_cast<std::size_t>(last->column), ' ') + entry + (whole ? end : ""));

@@ -1,4 +1,4 @@
-// Inserts a key into the text of a YAML file and leaves everything else unchanged: comments, order, empty lines.
+// Inserts a key into the text of a YAML file. Comments, order and empty lines remain unchanged.
 #pragma once
 
 #include <string>
@@ -6,19 +6,20 @@
 
 namespace proxarm::description {
 
-// A step of a path: a key, or the list member with this value of this key: {"drives"}, {"joint", "axis_1"}.
+// One step of a path through the file: a map's key, such as {"drives"}, or the list member whose key has a value, such
+// as {"joint", "axis_1"}.
 struct YamlStep {
   std::string key;
-  std::string is{};  // empty: the map under `key`
+  std::string is{};  // the value of `key` in the list member; empty: the step leads to the map under `key`
 };
 
-// Inserts `key: value` into the map at the end of `path`, which begins at the file's outermost map. In a block map the
-// key goes after the last key with a plain value on its line; in a map in braces after the first key. Returns false and
-// changes nothing if there is no such map or line, or if the map has the key.
+// Inserts `key: value` into the map at the end of `path`; `path` begins at the file's outermost map. In a block map,
+// the new key follows the last key with a plain value on its line. In a map in braces, it follows the first key.
+// Returns false and changes nothing if there is no such map or no such line, or if the map already has the key.
 [[nodiscard]] bool insert_key(std::string& text, const std::vector<YamlStep>& path, const std::string& key,
                               const std::string& value);
 
-// Whether such a map exists and has the key.
+// Whether the map at the end of `path` exists and has the key.
 [[nodiscard]] bool has_key(const std::string& text, const std::vector<YamlStep>& path, const std::string& key);
 
 }  // namespace proxarm::description

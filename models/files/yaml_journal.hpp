@@ -1,6 +1,6 @@
-// Records what readers ask of a YAML file: each key with its kind, unit, range and default. These facts exist only in
-// the reading calls (yaml_file.hpp, yaml_rules.hpp). `proxarm schema` makes schemas and reference tables from what a
-// journal records while example files are read.
+// Records what readers ask of a YAML file: each key with its kind, unit, range and default. These facts are stated only
+// in the reading calls (yaml_file.hpp, yaml_rules.hpp). A journal records them while example files are read, and
+// `proxarm schema` makes schemas and reference tables from the record.
 #pragma once
 
 #include <cstddef>
@@ -18,13 +18,13 @@ namespace proxarm::description {
 
 struct YamlFact {
   enum class Kind : std::uint8_t {
-    asked,        // the reader asks whether the key is there
-    required,     // required
-    needed,       // required because of other values in the file
-    refused,      // refused because of other values in the file
-    otherwise,    // the default without the key
-    map,          // a map ...
-    names,        // a map with keys chosen by the user, matching `pattern` if that isn't empty
+    asked,        // the reader asks whether the key exists
+    required,     // the key is required
+    needed,       // the key is required because of other values in the file
+    refused,      // the key is refused because of other values in the file
+    otherwise,    // the value that the reader uses without the key
+    map,          // a map whose keys follow as separate facts
+    names,        // a map whose keys are chosen by the user, and match `pattern` if `pattern` isn't empty
     exactly_one,  // a map that must have exactly one of `choices` as its keys
     list,
     numbers,
@@ -34,10 +34,10 @@ struct YamlFact {
     text,
     path,
     choice,
-    // Restrictions of a kind:
-    values,   // an integer out of these only
+    // The following kinds restrict another kind:
+    values,   // an integer that must be one of `values`
     pattern,  // a text that matches this regular expression
-    zero,     // a number that may also be 0, below its range
+    zero,     // a number that may also be 0, although 0 is below its range
   };
 
   Kind kind;
@@ -45,7 +45,7 @@ struct YamlFact {
   std::size_t min_size = 0, max_size = std::numeric_limits<std::size_t>::max();
   std::vector<std::string> choices{};
   std::vector<std::int64_t> values{};
-  std::string pattern{}, means{};  // means: the pattern in words
+  std::string pattern{}, means{};  // means: the pattern's meaning in words
   Json otherwise{};
 };
 
@@ -56,12 +56,13 @@ class YamlJournal {
   YamlJournal& operator=(const YamlJournal&) = delete;
   virtual ~YamlJournal() = default;
 
-  // A fact about the entry `key` of `parent`, which may be absent; or, without a key, about an element of the list
-  // `parent`.
+  // Records a fact about the entry `key` of `parent`, which may be absent. If `key` is empty, the fact is about an
+  // element of the list `parent`.
   virtual void note(const YamlNode& parent, std::string_view key, const YamlFact& fact) = 0;
 };
 
-// While it exists, `journal` records the files that this thread reads. One at a time.
+// While this object exists, `journal` records the files that this thread reads. Only one such object may exist at a
+// time.
 class YamlListening {
  public:
   explicit YamlListening(YamlJournal& journal) noexcept;
@@ -70,10 +71,11 @@ class YamlListening {
   ~YamlListening();
 };
 
-// Passes a fact to the active journal, if any.
+// Passes a fact to the active journal, if there is one.
 void note(const YamlNode& parent, std::string_view key, const YamlFact& fact);
 
-// Whether a journal is active; saves copying for a note without one.
+// Whether a journal is active. Callers ask this first, so that they needn't copy data for a fact that no journal
+// records.
 bool is_heard() noexcept;
 
 }  // namespace proxarm::description

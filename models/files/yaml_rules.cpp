@@ -28,7 +28,7 @@ std::string text_like(const YamlNode& node, std::string_view key, const Pattern&
   std::string text = node.string(key);
   if (is_heard())
     note(node, key, {.kind = YamlFact::Kind::pattern, .pattern = pattern.expression, .means = pattern.means});
-  // Patterns allow some dozens of characters; regex_match() recurses once per character.
+  // The length is limited because regex_match() recurses once per character. Patterns allow some dozens of characters.
   if (text.size() > 256 || !std::regex_match(text, std::regex(pattern.expression))) {
     throw node.error_at(key, pattern.means);
   }
@@ -94,7 +94,7 @@ std::pair<std::string, YamlNode> one_entry(const YamlNode& node, const std::vect
                                            const std::string& what, const std::string& example) {
   if (!node.is_map()) throw node.error(what + ", such as `" + example + "`");
   const bool known = std::any_of(kinds.begin(), kinds.end(), [&](const std::string& kind) { return node.has(kind); });
-  if (!known) node.finish();  // reports an unknown kind, with the nearest known one
+  if (!known) node.finish();  // reports an unknown kind and the nearest known kind
   const std::string kind = exactly_one(node, kinds, what + ": " + one_of(kinds));
   return {kind, node.map(kind)};
 }

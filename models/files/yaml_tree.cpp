@@ -1,5 +1,6 @@
-// Builds the tree of a YAML text. Checks size, encoding and tabs; yaml-cpp parses the structure, and its events become
-// Items. Events, unlike yaml-cpp's nodes, reveal duplicate keys, anchors and depth before anything is built from them.
+// Builds the tree of a YAML text. Checks size, encoding and tabs. yaml-cpp parses the structure, and its events are
+// turned into Items. The events are used because, unlike yaml-cpp's nodes, they show duplicate keys, anchors and depth
+// before anything is built from them.
 #include "models/files/yaml_tree.hpp"
 
 #include <fcntl.h>
@@ -23,16 +24,18 @@ namespace proxarm::description {
 namespace {
 
 constexpr std::size_t max_bytes = 16U << 20U;
-constexpr auto patience_with_pipes = std::chrono::seconds(2);  // in total
+constexpr auto patience_with_pipes = std::chrono::seconds(2);  // longest total time for reading a pipe
 constexpr std::size_t max_depth = 32;
 constexpr std::size_t max_key_bytes = 100;
-constexpr std::size_t max_keys =
-    1000;  // in one map; files have some dozens. Look-ups are linear, so more would be slow
+// Largest number of keys in one map. Files have some dozens. More keys would be slow, because the time of a look-up is
+// proportional to the number of keys.
+constexpr std::size_t max_keys = 1000;
 
-constexpr std::size_t max_values = 500'000;  // in a file; this many make a tree of about 100 MB
+// Largest number of values in one file. A tree of this many values takes about 100 MB.
+constexpr std::size_t max_values = 500'000;
 
-// yaml-cpp takes the end of the file as the end of an unclosed quote. This extra last line reveals that: to YAML it is
-// a comment, unless an open quote swallows it.
+// yaml-cpp accepts the end of the file as the end of an unclosed quote. This extra last line makes an unclosed quote
+// visible: for YAML the line is a comment, unless it is inside a quote.
 constexpr std::string_view last_line = "\n# end of file, unless in quotes: 5bd0d7a1\n";
 constexpr std::string_view last_words = "5bd0d7a1";
 
@@ -64,11 +67,11 @@ void check_text(std::string_view text, const std::filesystem::path& file) {
   }
 }
 
-// Bounds runs of opening brackets ([[[…): yaml-cpp looks ahead through a whole run before its first event. Counts
-// brackets in quotes and comments, too.
+// Limits the number of opening brackets in a row ([[[…), because yaml-cpp reads a whole such row before its first
+// event. Brackets in quotes and comments count, too.
 void check_brackets(std::string_view text, const std::filesystem::path& file) {
   int line = 1;
-  std::size_t run = 0;  // opening brackets and indicators in a row, ignoring blanks
+  std::size_t run = 0;  // opening brackets and indicators in a row, without blanks
   for (const char c : text) {
     if (c == '\n') ++line;
     if (c == '[' || c == '{') {
@@ -80,7 +83,7 @@ void check_brackets(std::string_view text, const std::filesystem::path& file) {
   }
 }
 
-// Reads a pipe, such as a shell's <(...). Its writer may be silent or missing.
+// Reads a pipe, such as a shell's <(...). Gives up if the pipe's writer is silent or missing.
 std::string read_pipe(const std::filesystem::path& file) {
   using Clock = std::chrono::steady_clock;
   const auto give_up = Clock::now() + patience_with_pipes;
@@ -92,7 +95,7 @@ std::string read_pipe(const std::filesystem::path& file) {
     const ssize_t n = ::read(descriptor, block.data(), block.size());
     if (n > 0) text.append(block.data(), static_cast<std::size_t>(n));
     if (n > 0) continue;
-    // A named pipe without a writer yet also reads as ended.
+    // A named pipe that has no writer yet also reads as ended.
     const bool may_begin = n == 0 && text.empty() && std::filesystem::is_fifo(file);
     if (!may_begin && (n == 0 || (errno != EAGAIN && errno != EINTR))) break;
     if (Clock::now() < give_up) {
@@ -138,7 +141,7 @@ std::string number_advice(std::string_view text) {
     return "write it without leading zeros";
   }
   if (digits.find(',') != std::string_view::npos) return "write a decimal point, not a comma";
-  // "3kg", "5 N": a number, then letters.
+  // The text is a number followed by letters, such as "3kg" or "5 N".
   const std::size_t end = text.find_first_not_of("+-0123456789.eE");
   if (end != std::string_view::npos && end > 0 && strict_number(text.substr(0, end))) {
     return "write the number alone; the key's name states the unit";
@@ -191,7 +194,7 @@ class YamlNode::Builder : public YAML::EventHandler {
   struct Level {
     Item* item;
     std::unordered_set<std::string> keys{};
-    bool has_key = false;  // a key without its value yet
+    bool has_key = false;  // whether a key was read whose value hasn't been read yet
     std::string key{};
     YAML::Mark key_mark{};
   };
@@ -244,7 +247,7 @@ class YamlNode::Builder : public YAML::EventHandler {
       item.key_line = level.key_mark.line + 1;
       item.key_column = level.key_mark.column + 1;
       level.has_key = false;
-      if (kind == Item::Kind::null) {  // yaml-cpp puts an absent value at the next token
+      if (kind == Item::Kind::null) {  // yaml-cpp reports an absent value at the next token
         item.line = item.key_line;
         item.column = item.key_column;
       }

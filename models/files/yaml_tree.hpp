@@ -1,4 +1,4 @@
-// The tree behind YamlNode; only yaml_file.cpp and yaml_tree.cpp include it.
+// Defines the tree behind YamlNode. Only yaml_file.cpp and yaml_tree.cpp include it.
 #pragma once
 
 #include <algorithm>
@@ -17,16 +17,17 @@ struct YamlNode::Item {
 
   Kind kind = Kind::null;
   bool is_quoted = false;
-  std::string text;                                        // of a scalar
-  std::string key;                                         // in the parent's map
-  std::size_t index = 0;                                   // in the parent's list
-  int line = 0, column = 0, key_line = 0, key_column = 0;  // from 1
+  std::string text;                                        // text of a scalar
+  std::string key;                                         // key in the parent, if the parent is a map
+  std::size_t index = 0;                                   // index in the parent, if the parent is a list
+  int line = 0, column = 0, key_line = 0, key_column = 0;  // counted from 1
   const Item* parent = nullptr;
-  mutable std::vector<Item*> children;     // an empty map is added if a reader sets defaults for it
-  mutable const Item* defaults = nullptr;  // a map that supplies missing keys
-  mutable std::vector<std::string> asked;  // keys that a reader has asked for
+  // If a reader sets defaults for a map that doesn't exist, an empty map is added.
+  mutable std::vector<Item*> children;
+  mutable const Item* defaults = nullptr;  // a map that supplies the keys that this map doesn't have
+  mutable std::vector<std::string> asked;  // the keys that a reader has asked for
 
-  // The key that names this value: its key, or for list elements the list's key.
+  // Returns the key that names this value: its own key or, for list elements, the key of the list.
   [[nodiscard]] std::string_view named() const noexcept {
     const Item* item = this;
     while (item->key.empty() && item->parent != nullptr) item = item->parent;
@@ -46,7 +47,7 @@ struct YamlNode::Item {
 
   [[nodiscard]] const Item* map_with(std::string_view wanted) const;
 
-  // The line of a key in this map itself; 0: missing.
+  // Returns the line of a key in this map itself, without defaults; 0 if the key is missing.
   [[nodiscard]] int line_of(std::string_view wanted) const noexcept {
     const Item* item = own(wanted);
     return item != nullptr ? item->key_line : 0;
@@ -59,10 +60,10 @@ struct YamlNode::Item {
 struct YamlNode::Document {
   std::filesystem::path file;
   std::filesystem::path folder;    // absolute
-  mutable std::deque<Item> items;  // stable addresses; the first is the root
+  mutable std::deque<Item> items;  // items have stable addresses; the first item is the root
 };
 
-// Why `text` isn't a number, if that isn't obvious.
+// Returns why `text` isn't a number, if this isn't obvious.
 std::string number_advice(std::string_view text);
 
 }  // namespace proxarm::description

@@ -1,4 +1,4 @@
-// Vectors and frames that all folders share.
+// Defines the vectors and frames that all folders share.
 //
 //   W  world: z up, fixed to the floor             ┌─ S sensor  (measures between flange and handle)
 //   B  base of the arm                       T tool ┤
@@ -8,8 +8,8 @@
 //                                          │
 //                                     W ───┘
 //
-// A vector's suffix names the frame in which it is expressed (force_S). X_WT is the pose of T in W. Poses read left to
-// right: X_WT = X_WB · X_BT.
+// A vector's suffix names the frame in which the vector is expressed (force_S). X_WT is the pose of T in W. Poses are
+// read from left to right: X_WT = X_WB · X_BT.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,7 +23,7 @@ using Vec3 = Vec<3>;
 using Mat3 = Eigen::Matrix3d;
 using Pose = Eigen::Isometry3d;
 
-// A vector of N dimensions as one of three; the missing coordinates become zero.
+// Returns a vector of N dimensions as a vector of three dimensions, whose added coordinates are zero.
 template <int N>
 Vec3 lift(const Vec<N>& x) noexcept {
   Vec3 x3 = Vec3::Zero();
@@ -31,7 +31,7 @@ Vec3 lift(const Vec<N>& x) noexcept {
   return x3;
 }
 
-// Force (N) and torque (Nm) about the origin of the frame in which they are expressed.
+// A force (N) and a torque (Nm) about the origin of the frame in which both are expressed.
 struct Wrench {
   Vec3 force = Vec3::Zero();
   Vec3 torque = Vec3::Zero();

@@ -1,18 +1,19 @@
-// Products, inverses and linear systems of matrices of any size, for work before a session: they allocate. Eigen would
-// compile its blocked forms anew, for seconds, in every source that uses one. Results equal Eigen's to the bit.
+// Products, inverses and linear systems of matrices of any size, for work before a session, because these functions
+// allocate. They exist because Eigen's blocked algorithms would take seconds to compile in every source that used them.
+// The results equal Eigen's to the bit.
 #pragma once
 
 #include "models/geometry/geometry.hpp"
 
 namespace proxarm::models {
 
-// A B. Precondition: A has as many columns as B has rows.
+// Returns A B. Precondition: A has as many columns as B has rows.
 Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
-// Aᵀ B. Precondition: A has as many rows as B.
+// Returns Aᵀ B. Precondition: A has as many rows as B.
 Eigen::MatrixXd transposed_product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
-// A⁻¹ by partial pivoting. The result isn't finite if A is singular.
+// Returns A⁻¹, by partial pivoting. The result isn't finite if A is singular.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& A);
-// A⁻¹ B by Cholesky decomposition. Precondition: A is symmetric and positive definite.
+// Returns A⁻¹ B, by Cholesky decomposition. Precondition: A is symmetric and positive definite.
 Eigen::MatrixXd solve_positive_definite(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 
 }  // namespace proxarm::models

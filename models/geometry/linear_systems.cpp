@@ -58,12 +58,12 @@ std::optional<Mat6> inverse_if_regular(const Mat6& A) noexcept {
   return lu.inverse();
 }
 
-// The algorithm of ColPivHouseholderQR::solve(), without its householderQ(): that would compile a form that is blocked
-// for more than 48 rows, and with it all of Eigen's large products.
+// Runs the algorithm of ColPivHouseholderQR::solve() without its call of householderQ(). That call would compile an
+// algorithm in blocks for more than 48 rows, and with it all of Eigen's large products.
 Unknowns solve_least_squares(const Equations& A, const Unknowns& b) noexcept {
   const Eigen::ColPivHouseholderQR<Equations> qr(A);
   const Eigen::Index rank = qr.nonzeroPivots();
-  Unknowns c = b;  // to be Qᵀ b
+  Unknowns c = b;  // becomes Qᵀ b
   double workspace = 0.0;
   for (Eigen::Index k = 0; k < rank; ++k) {
     const Eigen::Index below = A.rows() - k;

@@ -6,13 +6,16 @@
 namespace proxarm::models {
 namespace {
 
-// A row whose angle to the active rows' span has a smaller sine counts as dependent: their QR has no digits left there.
+// A row counts as dependent on the active rows if the sine of its angle to their span is below this. At smaller angles
+// the QR decomposition of the rows has no correct digits left.
 constexpr double dependent = 1e-10;
-// A row may be missed by this, relative to the size of its factors: some dozen roundings.
+// Tolerance of a row during the exchanges, relative to the size of its factors: some dozen rounding errors.
 constexpr double rounding = 1e-14;
-// A solution may miss a row by this, relative to the row's bound. Nearly parallel active rows leave no more digits.
+// Tolerance of a row in the solution, relative to the row's bound. Nearly parallel active rows leave no more digits.
 constexpr double held = 1e-6;
-constexpr int most_exchanges = 100;  // about three are usual; the method itself ends, but rounding can make it cycle
+// Largest number of exchanges of rows. About three are usual. Without rounding the method always ends; with rounding it
+// can cycle.
+constexpr int most_exchanges = 100;
 
 }  // namespace
 
@@ -69,7 +72,7 @@ void NearestInPolyhedron::equal(const SmallVector& e, double f) noexcept {
 
 void NearestInPolyhedron::at_most(const SmallVector& a, double b) noexcept { add(a, b); }
 
-// The columns of L⁻¹ and their negatives are the normals.
+// The normals of these rows are the columns of L⁻¹ and their negatives.
 void NearestInPolyhedron::within(const SmallVector& low, const SmallVector& high) noexcept {
   const Eigen::Index size = u0_.size();
   for (Eigen::Index i = 0; i < size; ++i) {
@@ -182,7 +185,7 @@ bool NearestInPolyhedron::solve() noexcept {
   return feasible && holds();
 }
 
-// Checks all rows at the end: nearly parallel rows lose digits, and the exchanges may have run out.
+// Checks all rows at the end, because nearly parallel rows lose digits and the exchanges may have ended too early.
 bool NearestInPolyhedron::holds() const noexcept {
   for (std::size_t i = 0; i < count_; ++i) {
     const double along = normal_[i].dot(v_), beyond = along - bound_[i];

@@ -9,8 +9,8 @@
 
 namespace proxarm::models {
 
-// A scripted motion, relative to the place where the scene describes the object: a turn about a point, a shift and a
-// swing.
+// A scripted motion: a turn about the point c, a shift and a swing. The motion is relative to the pose in which the
+// scene describes the object.
 //   x(t) = c + R(ω t) (x − c) + v t + a sin(2π f t + φ)
 struct ScriptedMotion {
   Vec3 velocity_m_per_s = Vec3::Zero();
@@ -30,7 +30,8 @@ struct ScriptedMotion {
   }
 };
 
-// Gram–Schmidt orthonormalisation in two passes. Returns X itself if its rotation is orthonormal within rounding.
+// Orthonormalises the rotation by two passes of Gram–Schmidt. Returns X itself if its rotation is orthonormal within
+// rounding.
 inline Pose orthonormalised(Pose X) noexcept {
   auto R = X.linear();
   const double off = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff();
@@ -43,7 +44,8 @@ inline Pose orthonormalised(Pose X) noexcept {
   return X;
 }
 
-// Whether t − T equals the time of the last step within rounding. If so, the last step's pose is reused, bit for bit.
+// Whether this step follows the last step directly: t − T equals the time of the last step within rounding. If so, the
+// callers reuse the last step's pose, bit for bit.
 inline bool follows(double time_s, double period_s, double last_time_s) noexcept {
   const double rounding_s = 4.0 * std::numeric_limits<double>::epsilon() * (std::abs(time_s) + period_s);
   return std::abs(time_s - period_s - last_time_s) <= rounding_s;

@@ -1,4 +1,5 @@
-// Matrices of up to eight rows whose size is set at run time. They are stored in place and don't allocate.
+// Matrices of up to eight rows whose size is set at run time. Their elements are stored in the object, so they don't
+// allocate.
 #pragma once
 
 #include <Eigen/Core>

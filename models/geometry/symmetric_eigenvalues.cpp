@@ -6,7 +6,7 @@
 
 namespace proxarm::models {
 
-// The algorithm of SelfAdjointEigenSolver::compute(), without its share for eigenvectors.
+// Runs the algorithm of SelfAdjointEigenSolver::compute() without its part for eigenvectors.
 SmallVector symmetric_eigenvalues(const SmallMatrix& A) noexcept {
   const double largest = A.cwiseAbs().maxCoeff(), scale = largest > 0.0 ? largest : 1.0;
   const Eigen::Tridiagonalization<SmallMatrix> tridiagonal(A / scale);

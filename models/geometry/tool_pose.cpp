@@ -5,7 +5,8 @@
 namespace proxarm::models {
 
 Quaternion rotation_from_z(const Vec3& direction) noexcept {
-  constexpr double nearly = 1e-12;  // closer to a half turn, 1 + c has lost half of its digits
+  // A turn counts as nearly a half turn if c + 1 is less than this; 1 + c has then lost more than half of its digits.
+  constexpr double nearly = 1e-12;
   const Vec3 from = Vec3::UnitZ(), to = direction.normalized();
   const double c = to.dot(from);
   const Vec3 axis = from.cross(to);

@@ -28,7 +28,8 @@ __extension__ using Wide = __float128;
 using Wide = long double;
 #endif
 
-// (b − a) × (c − a) as a unit vector, computed in numbers wider than double. `thin` is its length over ‖b − a‖ ‖c − a‖.
+// Returns (b − a) × (c − a) as a unit vector, computed in numbers wider than double. `thin` becomes the length of the
+// cross product over ‖b − a‖ ‖c − a‖.
 template <typename Number>
 Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c, double& thin) {
   const auto difference = [](double x, double y) { return static_cast<Number>(x) - static_cast<Number>(y); };
@@ -69,7 +70,7 @@ TriangleMesh::TriangleMesh(TriangleSoup soup) {
         throw std::invalid_argument("vertex " + std::to_string(i) +
                                     " has a coordinate that isn't finite or beyond 1e9");
       }
-      if (std::abs(x) < 1e-60) x = 0.0;  // required by mesh_predicates.hpp; also turns −0 into 0
+      if (std::abs(x) < 1e-60) x = 0.0;  // required by mesh_predicates.hpp; this also turns −0 into 0
     }
   }
   for (std::size_t t = 0; t < soup.triangles.size(); ++t) {
@@ -100,7 +101,7 @@ TriangleMesh TriangleMesh::restored(Structure structure) {
     for (const std::uint32_t index : triangle) require(index < vertices.size());
   }
   for (const Vec3& x : vertices) require((x.array().abs() <= 1e9).all());
-  // Each pair must come after the pair that leads to it, and the depth must fit a search's stack.
+  // Each pair must come after the pair that leads to it, and the tree's depth must fit the stack of a search.
   std::vector<int> depth(nodes.size(), 0);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     for (std::size_t k = 0; k < (i == 0 ? 1u : 2u); ++k) {
@@ -124,8 +125,8 @@ void TriangleMesh::weld(TriangleSoup& soup) {
   const auto& given = soup.vertices;
   std::vector<std::uint32_t> becomes(given.size()), place(given.size());
   std::vector<std::uint32_t> table(std::bit_ceil(2 * given.size() + 1), kUnused);
-  // Multiplicative hashing mixes the upper bits of the product. Coordinates from single precision have zeros in their
-  // lower 29 bits, so the lower bits would collide.
+  // Multiplicative hashing uses the upper bits of the product. The lower bits would collide, because coordinates from
+  // single precision have zeros in their lower 29 bits.
   const int below = 64 - std::countr_zero(table.size());
   for (std::uint32_t i = 0; i < given.size(); ++i) {
     std::uint64_t hash = 0;
@@ -154,7 +155,7 @@ void TriangleMesh::weld(TriangleSoup& soup) {
   }
 }
 
-// The root is alone in its pair: the other box is placed where no query finds it.
+// The root is alone in its pair. Places the pair's unused box where no query finds it.
 void TriangleMesh::empty_second_root() {
   constexpr float nowhere = std::numeric_limits<float>::infinity();
   for (auto& axis : structure_.nodes[0].box) {
@@ -176,8 +177,8 @@ void TriangleMesh::make_faces() {
                &c = structure_.vertices[triangle[2]];
     double thin = 0.0;
     Face face{a, normal_of<long double>(a, b, c, thin), 1.0, 0.0};
-    // In long double the cross product is wrong by 2⁻⁶³ of the sides' product. In a thin triangle that exceeds u of the
-    // product's length, so the normal is computed in wider numbers.
+    // In long double the cross product has an error of 2⁻⁶³ of the product of the sides' lengths. In a thin triangle
+    // this error exceeds u of the cross product's length, so the normal is computed in wider numbers.
     if (!(thin > 1e-2)) face.normal = normal_of<Wide>(a, b, c, thin);
     if (!(thin > 1e-15)) face.trust = std::numeric_limits<double>::infinity();
     face.offset = face.normal.dot(face.corner);
@@ -206,7 +207,7 @@ void TriangleMesh::check_closed() {
 
 namespace {
 
-// A triangle on its way into the tree: its box, rounded outwards, and the box's centre.
+// A triangle during the building of the tree: its box, rounded outwards, and the centre of the box.
 struct Item {
   std::array<float, 3> low, high, middle;
   std::uint32_t triangle;
@@ -229,7 +230,8 @@ std::vector<Item> items_of(const TriangleMesh& mesh) {
   return items;
 }
 
-// Puts the half of the items with the lower centres first, along the longest side of the box around the centres.
+// Puts the half of the items whose centres are lower first. "Lower" is along the longest side of the box around all
+// centres.
 void halve(std::span<Item> items, const std::array<float, 3>& low, const std::array<float, 3>& high) {
   std::size_t axis = 0;
   for (std::size_t k = 1; k < 3; ++k) axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
@@ -239,7 +241,7 @@ void halve(std::span<Item> items, const std::array<float, 3>& low, const std::ar
   });
 }
 
-// Sorts triangles in the order of the items, vertices in the order of their first use.
+// Sorts the triangles into the order of the items, and the vertices into the order of their first use.
 void put_in_order(const std::vector<Item>& items, TriangleMesh::Structure& structure) {
   std::vector<std::array<std::uint32_t, 3>> triangles(items.size());
   for (std::size_t t = 0; t < items.size(); ++t) triangles[t] = structure.triangles[items[t].triangle];
@@ -261,13 +263,14 @@ void put_in_order(const std::vector<Item>& items, TriangleMesh::Structure& struc
 
 }  // namespace
 
-// Builds the tree by median splits: halves the triangles by their boxes' centres, along the longest side of the box
-// around the centres, until they fit a leaf. Then puts triangles and vertices in that order.
+// Builds the tree by median splits: halves the triangles by the centres of their boxes, along the longest side of the
+// box around these centres, until a part fits into a leaf. Then sorts triangles and vertices into the order of the
+// tree.
 void TriangleMesh::build() {
   const auto count = static_cast<std::uint32_t>(size());
   std::vector<Item> items = items_of(*this);
   struct Part {
-    std::uint32_t begin, end, pair, of;  // `of`: index within the pair
+    std::uint32_t begin, end, pair, of;  // `of`: index of the node within the pair
   };
   structure_.nodes.reserve(count / (kLeaf / 2) + 2);
   structure_.nodes.emplace_back();
@@ -333,11 +336,12 @@ void TriangleMesh::test_exactly(std::uint32_t f, int side_x, int side_y, double 
   hit.consider(f, share > 0.0 ? std::min(share, 1.0) : 0.0);
 }
 
-// Calls visit(face) for all faces in the boxes that the way from x to y enters before the fraction share() of it.
+// Calls visit(face) for all faces in the boxes that the path from x to y enters before the fraction share() of the
+// path.
 template <typename Share, typename Visit>
 void TriangleMesh::along(const Vec3& x, const Vec3& y, Share share, Visit visit) const noexcept {
-  // The slab method: the way passes a box if it is within the box's bounds on all axes at once. A margin around the
-  // boxes covers the rounding of fractions.
+  // The slab method: the path passes a box if it is within the box's bounds on all axes at once. A margin around the
+  // boxes covers the rounding of the fractions.
   const Vec3 d = y - x;
   const Vec3 one_over(1.0 / d.x(), 1.0 / d.y(), 1.0 / d.z());
   const double margin = 16.0 * u * (x.lpNorm<1>() + y.lpNorm<1>());
@@ -346,7 +350,7 @@ void TriangleMesh::along(const Vec3& x, const Vec3& y, Share share, Visit visit)
     for (Eigen::Index k = 0; k < 3; ++k) {
       const double low = pair.low(of, k) - margin - x[k], high = pair.high(of, k) + margin - x[k];
       if (std::abs(d[k]) <= margin) {
-        // The way doesn't move along this axis: it is always or never within these bounds.
+        // The path doesn't move along this axis, so it is always or never within these bounds.
         if (low > margin || high < -margin) return false;
         continue;
       }
@@ -354,7 +358,7 @@ void TriangleMesh::along(const Vec3& x, const Vec3& y, Share share, Visit visit)
       enter = std::max(enter, std::min(a, b));
       leave = std::min(leave, std::max(a, b));
     }
-    constexpr double slack = 1e-14;  // well above the rounding of fractions, which are about 1
+    constexpr double slack = 1e-14;  // far above the rounding of fractions, which are about 1
     return !(enter > leave + slack || enter > share() + slack);
   };
   std::uint32_t stack[kDepth];
@@ -378,7 +382,8 @@ TriangleMesh::Hit TriangleMesh::first_hit(const Vec3& x, const Vec3& y) const no
   return hit;
 }
 
-// The parity of the number of faces that a ray crosses. A ray that meets an edge or a vertex is replaced by another.
+// Counts the faces that a ray from x crosses: x is inside if the number is odd. A ray that meets an edge or a vertex is
+// replaced by another ray.
 bool TriangleMesh::encloses(const Vec3& x) const noexcept {
   if (!x.allFinite()) return false;
   const double reach = 2.0 * ((bounds().high - bounds().low).norm() + (x - bounds().low).norm());
@@ -399,13 +404,13 @@ bool TriangleMesh::encloses(const Vec3& x) const noexcept {
   return std::abs(winding(x)) > 0.5;
 }
 
-// The squared distance to a triangle: to x's projection onto its plane if that is within all three sides, otherwise to
-// the nearest side.
+// Returns the squared distance from x to a triangle. If the projection of x onto the triangle's plane is within all
+// three sides, this is the squared distance to the plane, otherwise that to the nearest side.
 double TriangleMesh::face_distance2(std::uint32_t f, const Vec3& x) const noexcept {
   const Face& face = faces_[f];
   const Vec3 p[3] = {corner(f, 0), corner(f, 1), corner(f, 2)};
   double least = std::numeric_limits<double>::infinity();
-  bool within = face.trust == 1.0;  // a triangle thinner than rounding only has sides
+  bool within = face.trust == 1.0;  // a triangle thinner than rounding has sides only
   for (int k = 0; k < 3; ++k) {
     const Vec3 e = p[(k + 1) % 3] - p[k], d = x - p[k];
     if (face.trust == 1.0 && !(e.cross(face.normal).dot(d) > 0.0)) continue;
@@ -435,7 +440,7 @@ double TriangleMesh::distance_at_least(const Vec3& x, double most, std::uint32_t
     const NodePair& pair = structure_.nodes[waiting.pair];
     const std::array<double, 2> d2 = pair.distance2(around);
     const std::size_t nearer = d2[1] < d2[0] ? 1 : 0;
-    // Faces are tested immediately; of two inner nodes, the nearer one is next.
+    // Faces are tested immediately. Of two inner nodes, the nearer node is visited next.
     for (const std::size_t k : {1 - nearer, nearer}) {
       if (!(d2[k] < share2 * least)) continue;
       if (pair.count[k] == 0) stack[top++] = {pair.first[k], d2[k]};
@@ -454,7 +459,7 @@ double TriangleMesh::distance_at_least(const Vec3& x, double most, std::uint32_t
 double TriangleMesh::winding(const Vec3& x) const noexcept {
   double sum = 0.0;
   for (std::uint32_t f = 0; f < size(); ++f) {
-    // Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30 (1983), equation (8).
+    // Source: Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30 (1983), equation (8).
     const Vec3 a = corner(f, 0) - x, b = corner(f, 1) - x, c = corner(f, 2) - x;
     const double A = a.norm(), B = b.norm(), C = c.norm();
     const double lower = A * B * C + a.dot(b) * C + b.dot(c) * A + c.dot(a) * B;

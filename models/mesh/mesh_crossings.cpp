@@ -15,7 +15,7 @@ namespace {
 
 using Place = std::optional<Vec3>;
 
-// The heights of a face's corners over the plane of another face.
+// The heights of one face's corners over the plane of another face.
 struct Beside {
   int above = 0, below = 0;
   int on = 0;           // corners in the plane
@@ -24,14 +24,14 @@ struct Beside {
   double most = 0.0;  // largest |height|, m
   [[nodiscard]] bool both_sides() const noexcept { return above > 0 && below > 0; }
   [[nodiscard]] bool edge_in_plane() const noexcept { return on == 2; }
-  // The face meets the plane in at most one point.
+  // Whether the face meets the plane in at most one point.
   [[nodiscard]] bool clear() const noexcept { return most > kSheet_m && on < 2 && !both_sides(); }
 };
 
-// Directions from a line to the two faces beside an edge that lies in the line.
+// The directions from a line to the two faces beside an edge that lies in this line.
 using Wedge = std::array<Vec3, 2>;
 
-// Whether two wedges about one line cross: the faces of one are on both sides of the other.
+// Whether two wedges about one line cross: the two faces of one wedge are on different sides of the other wedge.
 bool cross_about(const Vec3& line, const Wedge& a, const Wedge& b) noexcept {
   const Vec3 u = a[0].normalized(), v = line.cross(u);
   const auto angle = [&](const Vec3& x) {
@@ -46,7 +46,7 @@ Vec3 across(const Vec3& from, const Vec3& line, const Vec3& to) noexcept {
   return (to - from) - line.dot(to - from) * line;
 }
 
-// Do two faces of a mesh cross or lie on one another, and where?
+// Tests whether two faces of a mesh cross or lie on one another, and finds the place.
 class FacePairs {
  public:
   explicit FacePairs(const TriangleMesh& mesh)
@@ -96,12 +96,12 @@ class FacePairs {
     return found;
   }
 
-  // For faces that share an edge.
+  // Whether two faces that share an edge lie on one another.
   [[nodiscard]] bool folded(std::uint32_t f, std::uint32_t g) const noexcept {
     return std::min(beside(f, g).most, beside(g, f).most) <= sheet_ && overlap(f, g);
   }
 
-  // By how much the projections of two faces onto a direction overlap, m.
+  // Returns the length (m) by which the projections of two faces onto a direction overlap.
   [[nodiscard]] double overlap_along(const Vec3& unit, std::uint32_t f, std::uint32_t g) const noexcept {
     const Vec3& origin = mesh_.corner(f, 0);
     const auto shadow = [&](std::uint32_t face) {
@@ -114,8 +114,8 @@ class FacePairs {
     return std::min(high_f - low_g, high_g - low_f);
   }
 
-  // Tests overlap in the plane of f by the separating-axis theorem: convex polygons are apart if and only if one of
-  // their sides separates them.
+  // Whether two faces overlap in the plane of f. Tests this by the separating-axis theorem: convex polygons are apart
+  // if and only if one of their sides separates them.
   [[nodiscard]] bool overlap(std::uint32_t f, std::uint32_t g) const noexcept {
     const Vec3& n = mesh_.face(f).normal;
     for (const std::uint32_t of : {f, g}) {
@@ -127,9 +127,10 @@ class FacePairs {
     return true;
   }
 
-  // The place where one face goes through the other: decided exactly, and only if deeper than rounding. The depth is
-  // the shortest move that separates the two, along a normal or across an edge of each. (Rounding of the direction
-  // across nearly parallel edges does no harm: any direction can prove them apart.)
+  // Returns the place where one face goes through the other face. Whether it does is decided exactly; the place is
+  // returned only if the depth exceeds rounding. The depth is the length of the shortest move that separates the faces,
+  // along a normal or perpendicular to an edge of each face. (If the edges are nearly parallel, the direction
+  // perpendicular to both is rounded. This does no harm, because any direction can prove that the faces are apart.)
   [[nodiscard]] Place cut(std::uint32_t f, std::uint32_t g) const noexcept {
     Place at = cut_by_edge(f, g);
     if (!at) at = cut_by_edge(g, f);
@@ -153,8 +154,9 @@ class FacePairs {
     return {};
   }
 
-  // The edge of g opposite the corner `off` lies in f's plane. Does g's surface continue behind it, on the other side
-  // of f, or of the two faces beside the edge of f on which it lies?
+  // Precondition: the edge of g opposite the corner `off` lies in the plane of f. Returns the place where the surface
+  // of g continues beyond this edge on the other side of f. If the edge of g lies on an edge of f, the two faces beside
+  // this edge of f replace f.
   [[nodiscard]] Place passed(std::uint32_t f, std::uint32_t g, std::size_t off) const noexcept {
     const std::size_t k = (off + 1) % 3;
     const Vec3 &from = mesh_.corner(g, k), &to = mesh_.corner(g, (k + 1) % 3);
@@ -180,15 +182,15 @@ class FacePairs {
     return {};
   }
 
-  // A piece of a line, by the distance from its first point, m.
+  // A piece of a line. Its ends are distances from the line's first point, m.
   struct Piece {
     double low, high;
   };
-  // The unit direction into the face, across its side k.
+  // Returns the unit direction across side k into the face.
   [[nodiscard]] Vec3 inwards(std::uint32_t f, std::size_t k) const noexcept {
     return mesh_.face(f).normal.cross(side(f, k)).normalized();
   }
-  // The piece of a line in the face's plane that is inside the face and on none of its sides.
+  // Returns the piece of a line in the face's plane that is inside the face and on none of the face's sides.
   [[nodiscard]] Piece inside(std::uint32_t f, const Vec3& from, const Vec3& line, double length) const noexcept {
     Piece piece{0.0, length};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -200,7 +202,7 @@ class FacePairs {
     }
     return piece;
   }
-  // The piece of a line that is on the face's side k.
+  // Returns the piece of a line that is on side k of the face.
   [[nodiscard]] Piece on_side(std::uint32_t f, std::size_t k, const Vec3& from, const Vec3& line,
                               double length) const noexcept {
     const Vec3 in = inwards(f, k), start = mesh_.corner(f, k) - from, end = start + side(f, k);
@@ -209,7 +211,8 @@ class FacePairs {
             std::min(length, std::max(line.dot(start), line.dot(end)))};
   }
 
-  // The opposite corner of the face on the other side of edge k; nullopt unless exactly one other face has this edge.
+  // Returns the opposite corner of the face on the other side of edge k, or nullopt unless exactly one other face has
+  // this edge.
   [[nodiscard]] std::optional<Vec3> apex_beyond(std::uint32_t f, std::size_t k) const noexcept {
     const std::uint32_t a = mesh_.triangle(f)[k], b = mesh_.triangle(f)[(k + 1) % 3];
     std::optional<Vec3> apex;

@@ -15,13 +15,13 @@ namespace {
 using Visit = std::function<bool(std::uint32_t, std::uint32_t)>;
 using Faces = std::vector<std::uint32_t>;
 
-// A node of the tree: its pair, and its index in the pair.
+// A node of the tree: the index of its pair, and its index within the pair.
 struct Node {
   std::uint32_t pair, of;
   [[nodiscard]] bool operator==(const Node&) const = default;
 };
 
-// A face's box, in float, so wide that faces whose boxes don't meet are farther apart than `margin`.
+// The box of a face, in float. It is so wide that faces whose boxes don't meet are farther apart than `margin`.
 struct Box {
   std::array<float, 3> low, high;
 };
@@ -45,8 +45,8 @@ bool meet(const Box& a, const Box& b) noexcept {
          a.low[2] <= b.high[2] && b.low[2] <= a.high[2];
 }
 
-// Calls visit(f, g) for each two faces whose boxes meet. False if there were more than `most`, or if visit() returned
-// false.
+// Calls visit(f, g) for all pairs of faces whose boxes meet. Returns false if there are more than `most` pairs, or if
+// visit() returns false.
 template <typename Meeting>
 bool walk_tree(const TriangleMesh& mesh, const std::vector<Box>& boxes, double margin, std::size_t most,
                Meeting visit) {
@@ -75,8 +75,8 @@ bool walk_tree(const TriangleMesh& mesh, const std::vector<Box>& boxes, double m
       }
       continue;
     }
-    // An inner node is replaced by its two children. A node paired with itself gives both of them with themselves, and
-    // one with the other.
+    // An inner node is replaced by its two children. If a node is paired with itself, the new pairs are each child with
+    // itself and one child with the other child.
     const std::uint32_t of_a = count(a) > 0 ? 1 : 2, of_b = count(b) > 0 ? 1 : 2;
     for (std::uint32_t i = 0; i < of_a; ++i) {
       for (std::uint32_t j = same ? i : 0; j < of_b; ++j) {
@@ -87,24 +87,29 @@ bool walk_tree(const TriangleMesh& mesh, const std::vector<Box>& boxes, double m
   return true;
 }
 
-// A box of space.
+// A box that is a part of space.
 struct Cell {
   Vec3 low, high;
 };
 
-// Divides space into cells, recursively, as long as that reduces the number of pairs of faces that share a cell.
+// Divides space into cells, recursively, as long as this reduces the number of pairs of faces that share a cell.
 //
-// Faces around one vertex v, its fan, share a cell there at any size of the cell. The rim of such a face is its edge
-// opposite v. Two faces of the fan need no test in a cell that neither one's rim enters:
-//   Two triangles that share the corner v, and a point other than corners of both, share a piece of a ray from v
-//   (they are convex). The ray leaves the smaller one through its rim. So they meet at a point of a rim.
-//   Two that share the corners v and w, and overlap in a plane, meet at a point that is on a rim as seen from v and on
-//   one as seen from w: where the ray from v along a side of one leaves the other, or at a corner of one within the
-//   other. So either vertex may be taken as the fan's.
-//   Two that share three corners are the same face twice; twins() finds them.
-// The same holds for faces that lie within near_m of one another's plane, in the projection onto it. A cell is extended
-// by 2 near_m on all sides: once for that distance, and once for rounding, which is a few u times the largest
-// coordinate S, while lift_m() is 64 u S.
+// All faces that contain one vertex v, the fan of v, share the cell around v, however small the cell is. The rim of
+// such a face is its edge opposite v. Two faces of the fan need no test in a cell that neither face's rim enters, for
+// these reasons:
+// 1. If two triangles share the corner v and a point that isn't a corner of both, they share a piece of a ray from v,
+//    because triangles are convex. The triangle that ends first along this ray ends at its rim. So the triangles meet
+//    at a point of a rim.
+// 2. If two triangles share two corners v and w and overlap in a plane, they meet at a point that is on the rim of one
+//    triangle for the fan of v, and on the rim of one triangle for the fan of w. This point is where the ray from v
+//    along a side of one triangle leaves the other triangle, or a corner of one triangle within the other triangle. So
+//    v or w may be chosen for the fan.
+// 3. If two triangles share three corners, they are the same face twice; twins() visits them.
+// 4. Faces that are within near_m of one another's plane are projected onto this plane, and steps 1 to 3 hold for the
+//    projections.
+//
+// Therefore a cell is extended by 2 near_m on all sides: by near_m for the distance in step 4, and by near_m for
+// rounding. (Rounding is a few u times the largest coordinate S, and near_m is at least lift_m(), which is 64 u S.)
 class CellSearch {
  public:
   CellSearch(const TriangleMesh& mesh, const std::vector<Box>& boxes, double near_m, const Visit& visit)
@@ -121,17 +126,17 @@ class CellSearch {
  private:
   static constexpr double kLess = 0.8, kCredit = 4.0;
 
-  // The interval that a face's piece within a cell covers along an axis.
+  // The interval along an axis that is covered by the piece of a face within a cell.
   struct Shadow {
     double low, high;
     std::uint32_t face;
   };
   using Shadows = std::vector<Shadow>;  // sorted by their lows
 
-  // The faces that enter a cell, and the number of pairs to test there.
+  // A cell with the faces that enter it, and the number of pairs to test in this cell.
   struct Part {
     Cell cell;
-    Shadows fan, others;  // fan: faces whose rim stays out of the cell
+    Shadows fan, others;  // fan: faces of one fan whose rims don't enter the cell; others: all other faces
     std::size_t pairs = 0;
     [[nodiscard]] std::size_t size() const noexcept { return fan.size() + others.size(); }
   };
@@ -140,7 +145,7 @@ class CellSearch {
     return !meet(boxes_[f], boxes_[g]) || visit_(std::min(f, g), std::max(f, g));
   }
 
-  // Visits pairs of faces with the same three corners.
+  // Visits the pairs of faces with the same three corners. Returns false to stop.
   [[nodiscard]] bool twins(const Faces& faces) const {
     std::vector<std::pair<std::array<std::uint32_t, 3>, std::uint32_t>> corners;
     for (const std::uint32_t f : faces) {
@@ -157,11 +162,13 @@ class CellSearch {
     return true;
   }
 
-  // Returns false to stop. Divides a cell if that leaves less than kLess of its pairs, or else at the expense of
-  // `credit`. So n divisions leave at most kCredit kLessⁿ times the pairs of the whole: the recursion ends, and useless
-  // divisions cost at most kCredit times the pairs.
+  // Tests the pairs of a cell, or divides the cell and searches its parts. Returns false to stop. Each division
+  // multiplies `credit` by kLess times the ratio of the pairs before and after the division; `credit` is at most
+  // kCredit. A cell is divided only if `credit` is then at least 1. So after n divisions at most kCredit kLessⁿ times
+  // the pairs of the whole mesh are left: the recursion ends, and useless divisions cost at most kCredit times the
+  // pairs.
   bool search(const Part& part, double credit) const {  // NOLINT(misc-no-recursion): it ends, as above
-    constexpr std::size_t few = 8;                      // pairs for each face: not worth dividing
+    constexpr std::size_t few = 8;                      // with fewer pairs for each face, dividing isn't worth its time
     if (part.pairs <= few * part.size()) return look_at(part);
     const std::vector<Part> parts = divided(part);
     double pairs = 0.0;
@@ -171,7 +178,8 @@ class CellSearch {
     return std::all_of(parts.begin(), parts.end(), [&](const Part& child) { return search(child, left); });
   }
 
-  // Tests pairs whose intervals overlap: the one with the higher low begins within the other.
+  // Tests the pairs whose intervals overlap. If two intervals overlap, the interval with the higher low begins within
+  // the interval with the lower low.
   [[nodiscard]] bool look_at(const Part& part) const {
     const auto look = [this](const Shadow& of, auto first, auto last) {
       return std::all_of(first, last, [&](const Shadow& other) { return meeting(of.face, other.face); });
@@ -202,7 +210,7 @@ class CellSearch {
     return std::upper_bound(shadows.begin(), shadows.end(), high, [](double x, const Shadow& a) { return x < a.low; });
   }
 
-  // Divides into eight, not quite in halves: meshes have many corners in the middle.
+  // Divides a cell into eight, at planes beside the middle because meshes often have corners exactly in the middle.
   [[nodiscard]] std::vector<Part> divided(const Part& part) const {
     const Vec3 share(0.4615, 0.5291, 0.4837);
     const Vec3 middle = part.cell.low + share.cwiseProduct(part.cell.high - part.cell.low);
@@ -239,7 +247,7 @@ class CellSearch {
     return part;
   }
 
-  // The vertex that most of the faces have.
+  // Returns the vertex that most of the faces contain.
   [[nodiscard]] std::uint32_t busiest(const Faces& faces) const {
     Faces corners;
     corners.reserve(3 * faces.size());
@@ -256,8 +264,9 @@ class CellSearch {
     return found;
   }
 
-  // By the separating-axis theorem: a box and a triangle (or an edge) are apart if and only if they are apart along an
-  // axis of the box, the triangle's normal, or an axis across an edge of each.
+  // Whether a face enters a cell, by the separating-axis theorem: a box and a triangle (or an edge) are apart if and
+  // only if their projections are apart on an axis of the box, on the triangle's normal, or on an axis perpendicular to
+  // an edge of each.
   [[nodiscard]] bool comes_into(std::uint32_t f, const Cell& cell) const noexcept {
     const Vec3 middle = 0.5 * (cell.low + cell.high), half = 0.5 * (cell.high - cell.low) + Vec3::Constant(margin_);
     const std::array<Vec3, 3> at{mesh_.corner(f, 0) - middle, mesh_.corner(f, 1) - middle, mesh_.corner(f, 2) - middle};
@@ -298,9 +307,9 @@ class CellSearch {
     return false;
   }
 
-  // The intervals along the axis on which they are thinnest. Candidates are the coordinate axes, the normals of some
-  // faces, and the axes in those faces across their longest edge: in a stack or a fan, faces are apart along one of
-  // these.
+  // Returns the faces' intervals along the axis on which they overlap least. Candidates are the coordinate axes, the
+  // normals of some faces, and for each of these faces the axis in its plane across its longest edge. In a stack or a
+  // fan, the faces are apart along one of these axes.
   [[nodiscard]] Shadows thinnest_shadows(const Cell& cell, const Faces& faces) const {
     const std::vector<Piece> pieces = pieces_of(cell, faces);
     Shadows thinnest = shadows_of(pieces, Vec3::UnitX());
@@ -325,8 +334,8 @@ class CellSearch {
     return thinnest;
   }
 
-  // The part of a triangle within a cell. It has at most nine corners: each of the cell's six sides cuts off one and
-  // makes two.
+  // The part of a triangle within a cell. It has at most nine corners, because each of the cell's six sides cuts off
+  // one corner and makes two.
   struct Piece {
     std::uint32_t face;
     std::size_t count;
@@ -346,21 +355,23 @@ class CellSearch {
     }
     return pieces;
   }
-  // Keeps the part with sign · x[axis] ≤ most (Sutherland and Hodgman, 1974), or the whole piece if there is no such
-  // part.
+  // Keeps the part of the piece with sign · x[axis] ≤ most (Sutherland and Hodgman, 1974), or the whole piece if it has
+  // no such part.
   static void cut(Piece& piece, Eigen::Index axis, double sign, double most) noexcept {
     Piece left{piece.face, 0, {}};
     for (std::size_t k = 0; k < piece.count; ++k) {
       const Vec3 &a = piece.corners[k], &b = piece.corners[(k + 1) % piece.count];
       const double over_a = sign * a[axis] - most, over_b = sign * b[axis] - most;
-      if (left.count + 2 > left.corners.size()) return;  // possible by rounding, if the polygon isn't convex any more
+      // Rounding can make the polygon non-convex, and it may then have too many corners.
+      if (left.count + 2 > left.corners.size()) return;
       if (over_a <= 0.0) left.corners[left.count++] = a;
       if ((over_a <= 0.0) != (over_b <= 0.0)) left.corners[left.count++] = a + over_a / (over_a - over_b) * (b - a);
     }
     if (left.count > 0) piece = left;
   }
 
-  // Widens the intervals by half of margin_ on both sides, which includes the rounding of the products, as above.
+  // Returns the intervals, widened on both sides by half of margin_. This half is near_m, which includes the rounding
+  // of the products (see CellSearch).
   [[nodiscard]] Shadows shadows_of(const std::vector<Piece>& pieces, const Vec3& axis) const {
     Shadows shadows;
     shadows.reserve(pieces.size());
@@ -375,7 +386,7 @@ class CellSearch {
     }
     return shadows;
   }
-  // The mean number of intervals that cover a point.
+  // Returns the mean number of intervals that cover a point.
   [[nodiscard]] static double crowding(const Shadows& shadows) noexcept {
     double low = shadows[0].low, high = shadows[0].high, sum = 0.0;
     for (const Shadow& shadow : shadows) {
@@ -395,7 +406,7 @@ class CellSearch {
 }  // namespace
 
 void each_near_pair(const TriangleMesh& mesh, double near_m, const Visit& visit) {
-  // In most meshes a box meets ten to twenty others.
+  // In most meshes, each box meets ten to twenty other boxes.
   constexpr std::size_t many = 64;
   const std::vector<Box> boxes = boxes_of(mesh, near_m);
   bool stopped = false;

@@ -1,8 +1,8 @@
-// A triangle mesh as an obstacle of a World. Each proxy needs a separate MeshObstacle, which remembers where the proxy
-// was; the TriangleMesh may be shared.
+// A triangle mesh as an obstacle of a World. A MeshObstacle remembers where the proxy was, so each proxy needs a
+// separate MeshObstacle. MeshObstacles may share a TriangleMesh.
 //
-// If several faces hold the proxy, the World sees the one that presses most. If a solution with other objects would
-// lead through a further face, that face joins them (World::fits).
+// If several faces hold the proxy, the World sees the face that presses most. If a solution with other objects would
+// lead through another face of the mesh, that face becomes a candidate too (World::fits).
 #pragma once
 
 #include <limits>
@@ -17,11 +17,12 @@ namespace proxarm::models {
 
 class MeshObstacle final : public Obstacle {
  public:
-  // Throws std::invalid_argument for a friction that isn't finite and ≥ 0.
+  // `of_face`: the friction of each face; empty: `friction` everywhere. Throws std::invalid_argument if a friction
+  // isn't finite or is negative.
   MeshObstacle(std::shared_ptr<const TriangleMesh> mesh, double friction, std::vector<double> of_face = {})
       : surface_(std::move(mesh), friction, std::move(of_face)) {}
 
-  // Step::feature is the face's index, or its complement (~) if the face's back is touched.
+  // Step::feature is the face's index, or its complement (~) if the proxy touches the back of the face.
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
     Step out;
     const std::uint64_t unresolved = surface_.unresolved_steps();
@@ -52,8 +53,9 @@ class MeshObstacle final : public Obstacle {
     return count;
   }
 
-  // A proxy may end at r if a step from q to p = r ends there. It may also end within a few lifts of that step's end,
-  // because the tangent planes of adjacent faces differ by that much; but never behind a face, which is tested exactly.
+  // A proxy may end at r if a step from q to p = r ends at r. It may also end within a few lifts of that step's end,
+  // because the tangent planes of adjacent faces differ by as much. But it may never end behind a face, and this is
+  // tested exactly.
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     const Vec3 reached = surface_(1.0, r, q);
     if (reached == r) return false;
@@ -67,7 +69,7 @@ class MeshObstacle final : public Obstacle {
     return {FlatSurface<3>::of_unit(face.corner + surface_.lift_m() * n, n), surface_.friction(index)};
   }
 
-  // Never negative: both sides of a mesh hold.
+  // Never negative, because both sides of a mesh hold a proxy.
   [[nodiscard]] double distance(const Vec3& x) const noexcept override {
     return mesh().distance(x, std::numeric_limits<double>::infinity(), near_);
   }
@@ -82,10 +84,14 @@ class MeshObstacle final : public Obstacle {
   bool parts(const Vec3& x, const Vec3& y, Vec3& normal) const noexcept override {
     return surface_.parts(x, y, normal);
   }
-  // Let the pose have a translation t, ‖t‖₁ ≤ `size`, and S be as in TriangleMesh::lift_m. A touched point has ‖x‖₁ ≤
-  // √3 S + size in W. The way to W and back rounds it by 8 u (‖x‖₁ + ‖t‖₁), and by 10 u √3 S because a rotation is
-  // orthonormal only within rounding. World does this twice: together less than 64 u (S + size). The same again keeps
-  // computed heights off the faces.
+  // Sets the lift of a mesh that moves. Derivation, where the pose has a translation t with ‖t‖₁ ≤ size, and S is as in
+  // TriangleMesh::lift_m:
+  // 1. A touched point x has ‖x‖₁ ≤ √3 S + size in W.
+  // 2. Transforming x to W and back rounds it by 8 u (‖x‖₁ + ‖t‖₁), and by 10 u √3 S because a rotation is orthonormal
+  //    only within rounding.
+  // 3. World does this twice, which rounds x by less than 64 u (S + size) in all.
+  // 4. The lift gets twice this amount, 128 u (S + size), so that computed heights also stay off the faces. This is
+  //    added to TriangleMesh::lift_m() = 64 u S.
   void set_rounding_size(double size_m) noexcept override {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
     surface_.set_lift(3.0 * mesh().lift_m() + 128.0 * u * size_m);
@@ -101,7 +107,7 @@ class MeshObstacle final : public Obstacle {
     return front ? contact.feature : ~contact.feature;
   }
 
-  mutable MeshSurface surface_;  // remembers data for speed; its answers don't depend on them
+  mutable MeshSurface surface_;  // remembers data for speed; its results don't depend on this data
   mutable std::uint32_t near_ = 0;
 };
 

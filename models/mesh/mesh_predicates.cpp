@@ -9,7 +9,7 @@ namespace {
 
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 
-// A rounded sum or product and its rounding error: high + low is exact.
+// A rounded sum or product, and its rounding error: high + low is the exact result.
 struct Pair {
   double high, low;
 };
@@ -20,7 +20,8 @@ Pair exact_sum(double a, double b) noexcept {
 }
 
 Pair exact_product(double a, double b) noexcept {
-  // Dekker's method: halves of 26 bits, whose products are exact. (Not every machine has a fused multiply-add.)
+  // Dekker's method: splits a and b into halves of 26 bits, whose products are exact. (Not every machine has a fused
+  // multiply-add.)
   constexpr double split = 134217729.0;  // 2²⁷ + 1
   const double x = a * b;
   const double a_big = split * a, a_high = a_big - (a_big - a), a_low = a - a_high;
@@ -28,8 +29,8 @@ Pair exact_product(double a, double b) noexcept {
   return {x, a_low * b_low - (((x - a_high * b_high) - a_low * b_high) - a_high * b_low)};
 }
 
-// An exact sum as Shewchuk's expansion: doubles that don't overlap, smallest first, without zeros. The last one has the
-// sum's sign.
+// An exact sum as Shewchuk's expansion: doubles that don't overlap, the smallest first, without zeros. The last double
+// has the sign of the sum.
 template <std::size_t Most>
 class ExactSum {
  public:
@@ -63,14 +64,14 @@ class ExactSum {
   std::size_t count_ = 0;
 };
 
-// b − a as pairs of doubles, exact.
+// The vector b − a, exact: a pair of doubles for each coordinate.
 struct ExactVector {
   std::array<Pair, 3> of;
   ExactVector(const Vec3& a, const Vec3& b) noexcept
       : of{exact_sum(b.x(), -a.x()), exact_sum(b.y(), -a.y()), exact_sum(b.z(), -a.z())} {}
 };
 
-// v_i w_j − v_j w_i
+// Returns v_i w_j − v_j w_i, exact.
 ExactSum<16> minor_of(const ExactVector& v, const ExactVector& w, std::size_t i, std::size_t j) noexcept {
   ExactSum<16> sum;
   const auto add = [&sum](double a, double b) {
@@ -100,9 +101,9 @@ int exact_orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& x
   return sum.sign();
 }
 
-// The segment and the triangle lie in one plane. Both are convex, so they are apart if and only if the line of a
-// triangle's side, or of the segment, separates them. The orientation with a third point beside the plane gives the
-// side of a line.
+// Whether a segment and a triangle in one plane touch. Both are convex, so they are apart if and only if the line of a
+// side of the triangle, or the line of the segment, separates them. The orientation of two points of a line, a third
+// point beside the plane and a point x tells on which side of the line x is.
 bool touches_in_plane(const Vec3& x, const Vec3& y, const std::array<Vec3, 3>& t) noexcept {
   Eigen::Index axis = 0;
   (t[1] - t[0]).cross(t[2] - t[0]).cwiseAbs().maxCoeff(&axis);
@@ -130,7 +131,7 @@ int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& x) noex
   const double determinant = (yz - zy) * d.x() + (zx - xz) * d.y() + (xy - yx) * d.z();
   const double size = (std::abs(yz) + std::abs(zy)) * std::abs(d.x()) +
                       (std::abs(zx) + std::abs(xz)) * std::abs(d.y()) + (std::abs(xy) + std::abs(yx)) * std::abs(d.z());
-  const double bound = (7.0 + 56.0 * u) * u * size;  // Shewchuk 1997, section 4.2
+  const double bound = (7.0 + 56.0 * u) * u * size;  // source: Shewchuk 1997, section 4.2
   if (determinant > bound) return 1;
   if (determinant < -bound) return -1;
   return exact_orientation(a, b, c, x);
@@ -142,7 +143,8 @@ bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
     const Eigen::Index j = (i + 1) % 3;
     const double m = d[i] * e[j], n = d[j] * e[i];
     if (std::abs(m - n) > 8.0 * u * (std::abs(m) + std::abs(n)))
-      return false;  // each difference of products is wrong by at most 4 u
+      // Each difference of products has an error of at most 4 u.
+      return false;
   }
   const ExactVector v(a, b), w(a, c);
   return minor_of(v, w, 0, 1).sign() == 0 && minor_of(v, w, 1, 2).sign() == 0 && minor_of(v, w, 2, 0).sign() == 0;

@@ -18,7 +18,7 @@ std::uint64_t edge_key(std::uint32_t a, std::uint32_t b) noexcept {
   return a < b ? (std::uint64_t{a} << 32 | b) : (std::uint64_t{b} << 32 | a);
 }
 
-// The ends of all edges with one face, sorted.
+// Returns the ends of all edges that have one face, sorted.
 std::vector<std::uint32_t> border_corners(const TriangleSoup& soup) {
   std::vector<std::uint64_t> edges;
   edges.reserve(3 * soup.triangles.size());
@@ -43,7 +43,8 @@ struct NearPair {
   std::uint32_t a, b;  // a < b
 };
 
-// Finds pairs of corners within a distance, nearest first, with a grid of cells as wide as that distance.
+// Finds the pairs of corners within a distance, the nearest pairs first, by a grid whose cells are as wide as this
+// distance.
 class NearCorners {
  public:
   NearCorners(const TriangleSoup& soup, const std::vector<std::uint32_t>& corners, double within)
@@ -52,8 +53,8 @@ class NearCorners {
     std::sort(cells_.begin(), cells_.end());
   }
 
-  // In each cell, a corner looks at kMost others with a larger index: enough to join all of them through each other,
-  // and linear in time if thousands of corners lie within the tolerance.
+  // Compares a corner with at most kMost corners of a larger index in each cell. This is enough to join all corners of
+  // a cell through each other, and the time remains linear if thousands of corners are within the tolerance.
   [[nodiscard]] std::vector<NearPair> pairs() const {
     std::vector<NearPair> found;
     for (const auto& [cell, corner] : cells_) {
@@ -76,7 +77,8 @@ class NearCorners {
   static constexpr int kMost = 64;
   using Cell = std::array<std::int64_t, 3>;
   [[nodiscard]] Cell cell_of(const Vec3& x) const {
-    // Coordinates are up to 1e9 m (TriangleMesh), so cells of at least 1e-9 m have numbers up to 1e18: no overflow.
+    // Coordinates are up to 1e9 m (TriangleMesh). So with cells of at least 1e-9 m, the numbers of cells are up to 1e18
+    // and don't overflow.
     const double size = std::max(within_, 1e-9);
     return {static_cast<std::int64_t>(std::floor(x.x() / size)), static_cast<std::int64_t>(std::floor(x.y() / size)),
             static_cast<std::int64_t>(std::floor(x.z() / size))};
@@ -87,7 +89,7 @@ class NearCorners {
   std::vector<std::pair<Cell, std::uint32_t>> cells_;
 };
 
-// Sets of corners that have become one: union-find, with each set's box and triangles.
+// Sets of corners that have become one corner: union-find, with the box and the triangles of each set.
 class Sets {
  public:
   Sets(const TriangleSoup& soup, double within)
@@ -100,7 +102,7 @@ class Sets {
     }
   }
 
-  // The least index of the set.
+  // Returns the least index in the set of v.
   [[nodiscard]] std::uint32_t root(std::uint32_t v) {
     while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
     return v;
@@ -121,7 +123,7 @@ class Sets {
   }
 
  private:
-  // Ignores triangles smaller than the tolerance.
+  // Whether a triangle has corners in both sets. Triangles smaller than the tolerance don't count.
   [[nodiscard]] bool share_a_triangle(std::uint32_t a, std::uint32_t b) {
     if (triangles_[b].size() < triangles_[a].size()) std::swap(a, b);
     return std::any_of(triangles_[a].begin(), triangles_[a].end(), [&](std::uint32_t t) {
@@ -141,7 +143,7 @@ class Sets {
   double within_;
   std::vector<std::uint32_t> parent_;
   std::vector<Bounds> boxes_;
-  std::vector<std::vector<std::uint32_t>> triangles_;  // of each root's set
+  std::vector<std::vector<std::uint32_t>> triangles_;  // the triangles of each root's set
 };
 
 }  // namespace
@@ -170,7 +172,7 @@ WeldedCorners weld_borders(TriangleSoup& soup, double within_m) {
 
 namespace {
 
-// Turns faces whose front may be chosen so that they agree with their neighbours.
+// Turns the faces whose front may be chosen (`free`), so that their fronts agree with those of their neighbours.
 class Fronts {
  public:
   Fronts(TriangleSoup& soup, const std::vector<bool>& free) : soup_(soup), free_(free), done_(free.size(), false) {
@@ -183,7 +185,7 @@ class Fronts {
   }
 
   void choose() {
-    // First starts from faces with a fixed front, then treats the parts without any.
+    // Starts from faces with a fixed front. Then treats the parts that have no such face.
     for (std::uint32_t f = 0; f < done_.size(); ++f) {
       if (!free_[f] && !done_[f]) (void)spread(f);
     }
@@ -208,7 +210,8 @@ class Fronts {
     return (t[0] == a && t[1] == b) || (t[1] == a && t[2] == b) || (t[2] == a && t[0] == b);
   }
 
-  // Walks from a face over edges with two faces, and turns the faces whose front may be chosen.
+  // Walks from a face over edges with two faces, and turns the free faces that it reaches. Returns the faces of the
+  // walk.
   std::vector<std::uint32_t> spread(std::uint32_t from) {
     std::vector<std::uint32_t> part{from};
     done_[from] = true;
@@ -235,7 +238,7 @@ class Fronts {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> edges_;
 };
 
-// The three corners sorted, and whether sorting turned the front.
+// Returns the three corners sorted, and whether the sorting turned the front.
 std::pair<Corners, bool> in_order(Corners t) noexcept {
   bool turned = false;
   const auto order = [&](std::size_t i, std::size_t j) {
@@ -249,15 +252,16 @@ std::pair<Corners, bool> in_order(Corners t) noexcept {
   return {t, turned};
 }
 
-// The first face with these three corners, and the first one with the opposite front, if any.
+// The first face with three given corners, and the first face with the same corners and the opposite front, if one
+// exists.
 struct SameCorners {
   std::uint32_t face;
   std::optional<std::uint32_t> opposite;
 };
 
-// For each set of corners: whether its faces with both fronts belong to a separate surface, a connected one without an
-// edge that a face with only one front shares. A wall between two bodies that touch isn't one: each body needs its side
-// of the wall.
+// Returns, for each set of corners, whether its two faces with opposite fronts belong to a separate surface: a
+// connected surface that has no edge in common with a face that has only one front. A wall between two bodies that
+// touch isn't a separate surface: each body needs its side of the wall.
 std::vector<bool> surfaces_on_their_own(const TriangleSoup& soup, const std::vector<SameCorners>& all) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> edges;
   for (std::uint32_t s = 0; s < all.size(); ++s) {
@@ -290,7 +294,8 @@ std::vector<bool> surfaces_on_their_own(const TriangleSoup& soup, const std::vec
 }  // namespace
 
 RepeatedFaces leave_out_repeated(TriangleSoup& soup) {
-  std::vector<std::tuple<Corners, std::uint32_t, bool>> faces;  // corners, face, whether sorting turned its front
+  // For each face: the sorted corners, the index, and whether sorting turned the face's front.
+  std::vector<std::tuple<Corners, std::uint32_t, bool>> faces;
   faces.reserve(soup.triangles.size());
   for (std::uint32_t f = 0; f < soup.triangles.size(); ++f) {
     const auto [corners, turned] = in_order(soup.triangles[f]);

@@ -23,7 +23,7 @@ MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double fricti
 void MeshSurface::set_lift(double lift_m) noexcept {
   if (lift_m == lift_) return;
   lift_ = lift_m;
-  near_radius_ = clearance_ = -1.0;  // remembered data was measured with the old lift
+  near_radius_ = clearance_ = -1.0;  // remembered data was measured with the lift before the change
   held_.side = 0;
 }
 
@@ -34,11 +34,11 @@ bool MeshSurface::is_clear(const Vec3& p, const Vec3& q) const noexcept {
 
 void MeshSurface::find_clearance(const Vec3& q) noexcept {
   constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
-  // Half of the true distance is cheap to find; the exact distance would require testing every face at about that
-  // distance.
+  // Half of the true distance is cheap to find. For the exact distance, every face at about that distance would have to
+  // be tested.
   const double distance = mesh_->distance_at_least(q, std::numeric_limits<double>::infinity(), nearest_face_, 0.5);
-  // Rounding may add a few u of the coordinates to the distance. One lift (64 u S) covers the mesh's coordinates, the
-  // last term covers q's. Two more lifts ensure that a proxy within the clearance doesn't touch either.
+  // Rounding may add a few u of the coordinates to the distance. One lift (64 u S) covers the mesh's coordinates, and
+  // the last term covers the coordinates of q. Two more lifts ensure that a proxy within the clearance touches nothing.
   clearance_ = distance * (1.0 - 16.0 * u) - 3.0 * lift_ - 16.0 * u * q.lpNorm<1>();
   clear_at_ = q;
 }
@@ -65,9 +65,9 @@ bool MeshSurface::has_near(const Vec3& x) const noexcept {
   return near_radius_ > 0.0 && (x - near_centre_).squaredNorm() < near_radius_ * near_radius_;
 }
 
-// Gathers the faces around a way that begins at x and leads by `move`. The ball reaches farther ahead than behind; it
-// shrinks while it holds more than kNear faces, but never below the way itself. Includes faces within a margin of 64
-// lifts, because a face counts as touched within a few lifts.
+// Gathers the faces around a path that begins at x and leads by `move`. The ball reaches farther ahead of x than behind
+// x. It shrinks as long as it contains more than kNear faces, but never so far that it doesn't contain the path. Faces
+// within a margin of 64 lifts are included, because a face counts as touched within a few lifts.
 void MeshSurface::come_near(const Vec3& x, const Vec3& move) noexcept {
   const double margin = 64.0 * lift_, reach = 1.001 * move.norm();
   double radius = std::max(4.0 * reach, 0.5 * mesh_->mean_edge_m());
@@ -125,9 +125,9 @@ void MeshSurface::keep_side(const Contact<3>& contact) noexcept {
   }
 }
 
-// The usual step, without a walk: the face that held the proxy alone still does. Returns true only if the walk would
-// find the same, bit for bit: by more than rounding, this face blocks the way to p, the step on it stays within its
-// sides, and no other face is touched or crossed.
+// Makes the usual step without a walk: the face that held the proxy alone in the last step holds it again. Returns true
+// only if the walk would find the same result, bit for bit. This is so if, by more than rounding, this face blocks the
+// path to p, the step on it stays within its sides, and no other face is touched or crossed.
 bool MeshSurface::glides(const Vec3& p, const Vec3& q, Vec3& r) noexcept {
   if (held_.side == 0 || !has_near(q)) return false;
   const TriangleMesh::Face& face = mesh_->face(held_.face);
@@ -136,7 +136,8 @@ bool MeshSurface::glides(const Vec3& p, const Vec3& q, Vec3& r) noexcept {
   const double from = held_.side * TriangleMesh::height(face, q), to = held_.side * TriangleMesh::height(face, p);
   const double end = held_.side * TriangleMesh::height(face, step.r);
   if (!(from > 0.5 * lift_ && from < 2.0 * lift_ && end > 0.5 * lift_ && to < -lift_)) return false;
-  // The way to p passes the face's plane before this fraction: twice the fraction at which computed heights vanish.
+  // The path to p passes the face's plane before this fraction, which is twice the fraction at which the computed
+  // height is zero.
   const double through = 2.0 * from / (from - to);
   const double inside = -lift_ - 1e-15 * (q.lpNorm<1>() + step.r.lpNorm<1>() + through * p.lpNorm<1>());
   for (std::size_t k = 0; k < 3; ++k) {

@@ -17,7 +17,7 @@ namespace {
 struct Edge {
   std::uint32_t low, high;  // vertices
   std::uint32_t face;
-  bool forth;  // the face traverses it from low to high
+  bool forth;  // the face traverses the edge from low to high
   [[nodiscard]] std::pair<std::uint32_t, std::uint32_t> key() const noexcept { return {low, high}; }
 };
 
@@ -36,8 +36,8 @@ std::vector<Edge> sorted_edges(const TriangleMesh& mesh) {
   return edges;
 }
 
-// Which faces belong to one part, and which of them face the other way: union-find with each face's parity to its
-// part's root.
+// Finds which faces belong to one part, and which faces of a part have the opposite front. Uses union-find, with the
+// parity of each face relative to its part's root.
 class Parts {
  public:
   explicit Parts(std::size_t faces) : parent_(faces), turned_(faces, false), one_sided_(faces, false) {
@@ -54,7 +54,7 @@ class Parts {
       turned = turned != turned_[at];
       at = parent_[at];
     }
-    // Path compression: all faces on the way get the root as parent.
+    // Path compression: every face on the path gets the root as its parent.
     for (bool left = turned; parent_[face] != face && face != at;) {
       const std::uint32_t next = parent_[face];
       const bool own = turned_[face];
@@ -65,7 +65,7 @@ class Parts {
     }
     return {at, turned};
   }
-  // `turned`: the two face opposite ways.
+  // Joins the parts of a and b. `turned`: whether a and b have opposite fronts.
   void join(std::uint32_t a, std::uint32_t b, bool turned) {
     const Root x = root(a), y = root(b);
     if (x.face == y.face) {
@@ -87,7 +87,8 @@ Vec3 middle(const TriangleMesh& mesh, std::uint32_t f) {
   return (mesh.corner(f, 0) + mesh.corner(f, 1) + mesh.corner(f, 2)) / 3.0;
 }
 
-// Calls visit(first, last) for each edge with its run of faces.
+// Calls visit(first, last) for each edge of the mesh. [first, last) are the entries of this edge in `edges`, one entry
+// per face.
 template <typename Visit>
 void each_edge(const std::vector<Edge>& edges, Visit visit) {
   for (auto first = edges.begin(); first != edges.end();) {
@@ -103,13 +104,14 @@ void note(MeshDefect& defect, const Vec3& at_W) {
 }
 
 struct Outlines {
-  std::vector<std::vector<std::uint32_t>> loops;   // the first vertex follows the last
-  std::vector<std::vector<std::uint32_t>> chains;  // from the first vertex to the last
+  std::vector<std::vector<std::uint32_t>> loops;   // closed: an edge connects the last vertex to the first vertex
+  std::vector<std::vector<std::uint32_t>> chains;  // open: the edges run from the first vertex to the last
 };
 
-// Outlines of the edges that have one face, walked against the face's direction, like the faces that would close them.
-// Chains come first, from vertices where more edges begin than end. After that, as many edges begin as end at each
-// vertex, and each walk returns to its start (Euler). A chain ends where outlines meet.
+// Returns the outlines of the edges that have one face. An outline runs against the direction of this face, as the
+// faces that would close it do. Chains are walked first, from vertices where more edges begin than end. After that,
+// equally many edges begin and end at each vertex, so each walk returns to its start (Euler). A chain ends where
+// outlines meet.
 Outlines outlines_of(std::vector<std::pair<std::uint32_t, std::uint32_t>> open, std::size_t vertices) {
   std::sort(open.begin(), open.end());
   std::vector<bool> used(open.size(), false);
@@ -158,7 +160,8 @@ Outlines outlines_of(std::vector<std::pair<std::uint32_t, std::uint32_t>> open, 
   return found;
 }
 
-// Longer outlines aren't worth closing. Their area comes from Newell's normal, at almost no cost.
+// Loops with more vertices aren't closed, because this would take too long. The area of such a loop is computed from
+// Newell's normal, which takes almost no time.
 constexpr std::size_t longest_loop = 2000;
 
 using Cover = std::vector<std::array<std::uint32_t, 3>>;
@@ -174,8 +177,9 @@ double area_of(const TriangleMesh& mesh, const Cover& cover) {
   return area;
 }
 
-// Repeatedly cuts off the corner with the smallest triangle. Along a crack these are the slivers across it. Ear
-// clipping, which works in a projection, can't tell them from the crack's surroundings.
+// Covers a loop by cutting off, again and again, the corner with the smallest triangle. Along a crack these triangles
+// are the slivers across the crack. Ear clipping works in a projection, so it can't distinguish these slivers from the
+// crack's surroundings.
 Cover slivers_first(const TriangleMesh& mesh, std::vector<std::uint32_t> loop) {
   const auto triangle_at = [&loop](std::size_t k) {
     return std::array{loop[(k + loop.size() - 1) % loop.size()], loop[k], loop[(k + 1) % loop.size()]};
@@ -195,8 +199,8 @@ Cover slivers_first(const TriangleMesh& mesh, std::vector<std::uint32_t> loop) {
   return triangles;
 }
 
-// The better of two covers. A loop of n vertices has many covers of n − 2 triangles, and the smallest is costly to
-// find.
+// Returns the smaller of two covers of a loop. A loop of n vertices has many covers of n − 2 triangles, and the
+// smallest of all would take long to find.
 Cover cover(const TriangleMesh& mesh, const std::vector<std::uint32_t>& loop) {
   Cover ears;
   if (loop.size() < 3) return ears;
@@ -235,7 +239,7 @@ MeshBorder border_of(const TriangleMesh& mesh, const std::vector<std::uint32_t>&
   return border;
 }
 
-// Counts faces that are turned against most of their part, and closed parts that are inside out.
+// Counts the faces whose front is opposite to most faces of their part, and the closed parts that are inside out.
 void judge_sides(const TriangleMesh& mesh, Parts& parts, const std::vector<bool>& open_part, MeshTopology& found) {
   struct Part {
     std::size_t faces = 0, turned = 0;

@@ -13,20 +13,25 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-// Costs in units of about 15 ns. One step may cost kBudget, 0.36 ms; typical steps cost some tens of units. A step that
-// needs more would endanger a cycle of 1 ms, so it is given up, and the proxy stays at the place it reached. Testing a
-// way costs kLook, or kFarLook beyond the remembered faces; solving for two or three faces costs kSolve.
+// Costs, in units of about 15 ns. One step may cost kBudget, which is 0.36 ms; typical steps cost some tens of units. A
+// step that needs more would endanger a cycle of 1 ms, so it ends, and the proxy stays where it is at that point.
+// Testing a path costs kLook, or kFarLook if the path leaves the remembered faces. Solving for two or three faces costs
+// kSolve.
 constexpr int kBudget = 24'000, kLook = 20, kFarLook = 100, kSolve = 20;
 
-// Lengths, in lifts. A face holds a proxy until kPast beyond the face's edge. If the next face turns away by the angle
-// φ, the proxy is then at the height cos φ + kPast sin φ over that face, which is positive up to φ = 165°. On the line
-// of an edge the proxy is tan(φ/2) beyond the edges of both faces: kAround covers angles up to 172°.
+// Lengths, in lifts. A face holds a proxy up to kPast beyond the face's edge.
+//
+// kPast: if the next face turns away by the angle φ, a proxy kPast beyond the edge is at the height cos φ + kPast sin φ
+// over the next face. This height is positive up to φ = 165°.
+//
+// kAround: on the line of an edge, the proxy is tan(φ/2) beyond the edges of both faces. kAround covers this up to φ =
+// 172°.
 constexpr double kPast = 4.0;
 constexpr double kAround = 16.0;
-// A face counts as touched if the proxy is between these heights over its touched surface. The face itself is at −1;
-// passing a side leads up to cos φ + kPast sin φ − 1 ≤ 3.2.
+// A face counts as touched if the proxy's height over the face's touched surface is between these two heights, in
+// lifts. The face itself is at −1. A proxy that passes a side is at a height of up to cos φ + kPast sin φ − 1 ≤ 3.2.
 constexpr double kBelow = -1.5, kAbove = 4.0;
-constexpr double kSharpest = 0.0078;  // 1 + cos φ at 172°
+constexpr double kSharpest = 0.0078;  // 1 + cos φ at φ = 172°
 
 }  // namespace
 
@@ -41,7 +46,7 @@ MeshSurface::Walk::Walk(MeshSurface& surface, const Vec3& to, const Vec3& from) 
       came_from(kNone),
       budget(kBudget) {
   const double far = (p - q).lpNorm<1>();
-  // 1e12 m is beyond any mesh, and still within the range in which the predicates are exact.
+  // A point at 1e12 m is beyond any mesh, and within the range in which the predicates are exact.
   if (far > 1e12) p_at = q + (p - q) * (1e12 / far);
   for (double& x : c) {
     if (std::abs(x) < 1e-60) x = 0.0;
@@ -100,7 +105,8 @@ TriangleMesh::Hit MeshSurface::Walk::look(const Vec3& x, const Vec3& y) noexcept
   return hit;
 }
 
-// Adds a touched face, sorted by index, so that results don't depend on the order of finding.
+// Adds a touched face. The faces are sorted by index, so that results don't depend on the order in which they are
+// found.
 void MeshSurface::Walk::add(std::uint32_t index, const TriangleMesh::Face& face, int side) noexcept {
   std::size_t at = count;
   while (at > 0 && touched[at - 1].face > index) --at;
@@ -134,15 +140,15 @@ void MeshSurface::Walk::touch() noexcept {
   }
 }
 
-// Whether the way from c to x meets a touched face, except those in whose planes c lies.
+// Whether the path from c to x meets a touched face. Faces in whose plane c lies don't count.
 bool MeshSurface::Walk::crosses(const Vec3& x) const noexcept {
   return std::any_of(touched.begin(), touched.begin() + static_cast<std::ptrdiff_t>(count),
                      [&](const Side& face) { return face.side != 0 && mesh.touched_by(face.face, c, x); });
 }
 
-// Moves a q that lies exactly in the planes of touched triangles out of them, by one lift along the sum of their
-// normals, or backwards if another touched face blocks only the forward way. Repeats if this ends in further planes.
-// False if the normals cancel, or after four rounds.
+// Moves a q that lies exactly in the planes of touched triangles out of these planes, by one lift along the sum of
+// their normals. If another touched face blocks only the path along this sum, moves q in the opposite direction.
+// Repeats this if q is then in further planes. Returns false if the normals cancel each other, or after four rounds.
 bool MeshSurface::Walk::leave_planes() noexcept {
   for (int round = 0; round < 4; ++round) {
     Vec3 out = Vec3::Zero();
@@ -177,7 +183,8 @@ bool MeshSurface::Walk::is_around(std::uint32_t face, const Vec3& x, double lift
   return true;
 }
 
-// The fraction of the way from c to `to` on which the face holds the proxy: 1: all of it, 0: none.
+// Returns the fraction of the path from c to `to` on which the face holds the proxy: 1 for the whole path, 0 for no
+// part of it.
 double MeshSurface::Walk::share_on(std::uint32_t face, const Vec3& to, std::size_t& exit) const noexcept {
   const Vec3& n = mesh.face(face).normal;
   double share = 1.0;
@@ -199,8 +206,8 @@ double MeshSurface::Walk::share_on(std::uint32_t face, const Vec3& to, std::size
   return share;
 }
 
-// Whether the target leads back over the side over which the proxy has just left the other face. Then neither face
-// holds the proxy alone; their edge may.
+// Whether the target leads back over the side over which the proxy has just left another face. Then neither of these
+// faces holds the proxy alone; their common edge may hold it.
 bool MeshSurface::Walk::goes_back(const Target& target) const noexcept {
   if (came_from == kNone || target.exit > 2) return false;
   const auto &own = mesh.triangle(touched[target.of[0]].face), &other = mesh.triangle(came_from);
@@ -208,7 +215,7 @@ bool MeshSurface::Walk::goes_back(const Target& target) const noexcept {
   return touched[target.of[0]].face != came_from && has(own[target.exit]) && has(own[(target.exit + 1) % 3]);
 }
 
-// Moves the proxy up to a face that blocks its way; that face then joins the touched ones.
+// Moves the proxy up to a face that blocks its path. This face is then added to the touched faces.
 StepResult MeshSurface::Walk::run_into(const TriangleMesh::Hit& hit, const Vec3& towards) noexcept {
   const TriangleMesh::Face& face = mesh.face(hit.face);
   if (touches(hit.face) || face.trust > 1.0) return StepResult::no_progress;
@@ -268,8 +275,8 @@ StepResult MeshSurface::Walk::try_singles() noexcept {
     const double share = share_on(touched[i].face, step.r, exit);
     if (!(share > 0.0)) continue;
     targets[found] = {step.r, share, {i, 0, 0}, {step.slips, false, false}, 1, exit};
-    // Faces that hold the proxy all the way come first. At a convex edge the proxy may be able to stick on one face and
-    // slide on the other. The point nearer to p is chosen, because it depends least on K.
+    // Faces that hold the proxy on the whole path come first. At a convex edge, the proxy may be able to stick on one
+    // face and to slide on the other face. Then the end nearer to p is chosen, because it depends least on K.
     distance2[found++] = (step.r - p).squaredNorm() * (share < 1.0 ? 1e100 : 1.0);
   }
   for (std::size_t tried = 0; tried < found && budget > 0; ++tried) {
@@ -293,10 +300,11 @@ StepResult MeshSurface::Walk::try_pair(std::size_t i, std::size_t j) noexcept {
   const FlatSurface<3> f = touched[i].surface(), g = touched[j].surface();
   GrooveLine line(f, g);
   if (!line.exists || 1.0 + line.cos < kSharpest) return StepResult::no_progress;
-  // The line's origin moves next to q, so that short slides aren't lost in the rounding of large coordinates.
-  double begin = 0.0, end = 0.0;  // the edge's ends, along the line
+  // The line's origin is moved next to q, so that short slides aren't lost in the rounding of large coordinates.
+  double begin = 0.0, end = 0.0;  // the positions of the edge's ends along the line
   if (edge) {
-    // The line comes from the edge's vertices: planes determine it only to rounding over the angle between them.
+    // The line is computed from the edge's vertices, because the planes determine it only to rounding divided by the
+    // angle between them.
     const Vec3 &start = mesh.vertex(shared[0]), along = mesh.vertex(shared[1]) - start;
     const double length = along.norm();
     const bool forth = line.e.dot(along) > 0.0;
@@ -311,7 +319,7 @@ StepResult MeshSurface::Walk::try_pair(std::size_t i, std::size_t j) noexcept {
   } else {
     for (int k = 0; k < 3; ++k) line.x0 = line.settle(f, g, k == 0 ? q : line.x0);
   }
-  // q is on the line if both heights are at most kAbove · lift.
+  // q counts as on the line if both heights are at most kAbove · lift.
   const bool in_line = std::abs(f.height(q)) <= kAbove * lift && std::abs(g.height(q)) <= kAbove * lift;
   const Vec3 from = !in_line || (f.holds(q) && g.holds(q)) ? q : line.settle(f, g, line.settle(f, g, q));
   const GrooveSolution solution =
@@ -358,7 +366,8 @@ void MeshSurface::Walk::report(std::size_t contacts, const std::array<std::size_
   }
 }
 
-// Whether these faces, all sticking, can bear the force: it is in the sum of their friction cones.
+// Whether these faces can exert the force if the proxy sticks to all of them: the force is in the sum of their friction
+// cones.
 bool MeshSurface::Walk::can_support(std::size_t contacts, const std::array<std::size_t, 3>& of) const noexcept {
   std::array<ForceCone, 3> cones;
   for (std::size_t k = 0; k < contacts; ++k) cones[k] = {touched[of[k]].normal, s.friction(touched[of[k]].face)};
@@ -366,14 +375,15 @@ bool MeshSurface::Walk::can_support(std::size_t contacts, const std::array<std::
   return in_sum_of_cones(c - p, {cones.data(), contacts}, lift + 8.0 * u * p.lpNorm<1>());
 }
 
-// The fallback if no set of faces lets the proxy move: it is held where it is, as by a vertex.
+// Ends a step in which no set of faces lets the proxy move: the proxy stays where it is, for example at a vertex.
 void MeshSurface::Walk::hold() noexcept {
-  if (c != q && (c - q).norm() <= kAround * lift) c = q;  // so small a move comes only from leave_planes()
+  // A move of at most kAround · lift comes only from leave_planes(). It is undone.
+  if (c != q && (c - q).norm() <= kAround * lift) c = q;
   report_holding();
   for (std::size_t k = 0; k < s.count_; ++k) s.contacts_[k].reached = c != q;
 }
 
-// Reports at most three faces that can bear the force.
+// Reports at most three faces that can exert the force.
 void MeshSurface::Walk::report_holding() noexcept {
   const std::size_t n = std::min(count, std::size_t{16});
   constexpr std::array<bool, 3> at_rest{false, false, false};

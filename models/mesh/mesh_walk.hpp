@@ -1,4 +1,4 @@
-// One step of a MeshSurface, as a walk of straight pieces from q (mesh_surface.hpp). Internal to this room.
+// One step of a MeshSurface, as a walk of straight pieces from q (mesh_surface.hpp). Used only in this room.
 #pragma once
 
 #include <algorithm>
@@ -11,28 +11,30 @@
 namespace proxarm::models {
 
 struct MeshSurface::Walk {
-  // A touched face, seen from the proxy's side.
+  // A touched face, with the normal on the proxy's side.
   struct Side {
     std::uint32_t face;
-    int side;            // 1: in front, −1: behind, 0: exactly in the triangle's plane (only for a caller's q)
-    Vec3 point, normal;  // of the touched surface, which is a lift away from the face
+    // 1 if the proxy is in front of the face, −1 if it is behind, 0 if it is exactly in the triangle's plane (only
+    // possible for a caller's q).
+    int side;
+    Vec3 point, normal;  // point and normal of the touched surface, which is one lift in front of the face
     [[nodiscard]] FlatSurface<3> surface() const noexcept { return FlatSurface<3>::of_unit(point, normal); }
   };
-  // Most faces that are considered together. A regular mesh has six around a vertex. Of more than 64, those with the
-  // least indices count; the proxy may then stick at the vertex where it could slide.
+  // Largest number of faces that are considered together. A regular mesh has six faces around a vertex. Of more than 64
+  // faces, the faces with the least indices are considered; the proxy may then stick at a vertex where it could slide.
   static constexpr std::size_t kMost = 64;
-  // For up to this many touched faces, all pairs and triples are tried. For more, only pairs that share a side: the
-  // number of triples grows with the cube.
+  // For up to this many touched faces, all pairs and triples are tried. For more faces, only pairs that share a side
+  // are tried, because the number of triples grows with the cube of the number of faces.
   static constexpr std::size_t kAll = 8;
 
-  // The end of the way on which a set of faces lets the proxy go: r, or the fraction `share` of the way there.
+  // The point to which a set of faces lets the proxy go: r, or the fraction `share` of the path to r.
   struct Target {
     Vec3 r;
     double share;
     std::array<std::size_t, 3> of;  // indices in touched
     std::array<bool, 3> slips;
     std::size_t count;
-    std::size_t exit = 3;  // for a single face: the side over which the proxy leaves it; 3: none
+    std::size_t exit = 3;  // for a single face: the side over which the proxy leaves the face; 3: no side
   };
 
   Walk(MeshSurface& surface, const Vec3& to, const Vec3& from) noexcept;
@@ -65,16 +67,17 @@ struct MeshSurface::Walk {
   const TriangleMesh& mesh;
   const double lift;
   const Vec3 p, q;
-  Vec3 c;                   // the proxy on its walk
-  Vec3 p_at;                // p, or a point on the way there if p is too far for exact tests
-  std::uint32_t came_from;  // the face that the last move left over a side
-  int budget;               // what the step may still cost, see kBudget
+  Vec3 c;                   // the present position of the proxy in the walk
+  Vec3 p_at;                // p, or a point on the path to p if p is too far for exact tests
+  std::uint32_t came_from;  // the face that the last move left over one of its sides; kNone: no such face
+  int budget;               // the cost that the step may still spend, see kBudget
   std::size_t count = 0;
   std::array<Side, kMost> touched;
 };
 
-// The computed nᵀx − nᵀcorner is wrong by less than 9 u of ‖x‖₁ and of ‖corner‖₁: products and sums 4 u each, the
-// normal 2 u, the offset 4 u. The bound uses 16 u; a quarter of the lift is 16 u of the largest ‖corner‖₁.
+// The computed nᵀx − nᵀcorner has an error of less than 9 u of ‖x‖₁ and 9 u of ‖corner‖₁: products and sums contribute
+// 4 u each, the normal 2 u and the offset 4 u. The bound in the code is 16 u of each, because a quarter of the lift is
+// 16 u of the largest ‖corner‖₁.
 template <typename Visit>
 void MeshSurface::maybe_between(const Vec3& x, const Vec3& y, double margin, Visit visit) const noexcept {
   constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();

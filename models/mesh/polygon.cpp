@@ -5,7 +5,8 @@
 namespace proxarm::models {
 namespace {
 
-// In long double a product of two differences of floats is exact, and of doubles exact to 2⁻⁶³.
+// A point in the plane. In long double, the product of two differences is exact for coordinates in float, and has an
+// error of 2⁻⁶³ for coordinates in double.
 struct Flat {
   long double x, y;
   bool operator==(const Flat&) const = default;
@@ -15,8 +16,8 @@ long double turn(const Flat& a, const Flat& b, const Flat& c) noexcept {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-// The corners projected onto the coordinate plane that shows most of the polygon, counter-clockwise. Empty if the
-// polygon has no net area, such as a bow with equal halves.
+// Returns the corners projected onto the coordinate plane in which the polygon has the largest area, counter-clockwise.
+// Returns an empty list if the polygon has no net area, such as a bow with equal halves.
 std::vector<Flat> flattened(std::span<const Vec3> vertices, std::span<const std::uint32_t> corners) {
   Vec3 normal = Vec3::Zero();
   const Vec3& origin = vertices[corners[0]];
@@ -34,7 +35,7 @@ std::vector<Flat> flattened(std::span<const Vec3> vertices, std::span<const std:
   return flat;
 }
 
-// The remaining corners, as a ring.
+// The corners that are not yet cut off, as a ring.
 class Ring {
  public:
   explicit Ring(std::vector<Flat> flat) : flat_(std::move(flat)), left_(flat_.size()) {
@@ -47,8 +48,8 @@ class Ring {
   }
   void cut(std::size_t k) { left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(k)); }
 
-  // Whether the corner may be cut off: it turns left, and no other corner is in its triangle. A corner in the same
-  // place as one of the triangle's is at a seam and doesn't count.
+  // Whether corner k may be cut off: it turns left, and no other corner is in the triangle of k and its neighbours. A
+  // corner at the same place as a corner of this triangle belongs to a seam and doesn't count.
   [[nodiscard]] bool is_ear(std::size_t k) const noexcept {
     const auto [before, here, after] = at(k);
     const Flat &a = flat_[before], &b = flat_[here], &c = flat_[after];
@@ -61,7 +62,7 @@ class Ring {
     return true;
   }
 
-  // Twice the area of the triangle that a corner makes with its neighbours: 0 if the three are in line.
+  // Returns twice the area of the triangle of corner k and its neighbours: 0 if the three corners are in line.
   [[nodiscard]] long double turn_at(std::size_t k) const noexcept {
     const auto [before, here, after] = at(k);
     return turn(flat_[before], flat_[here], flat_[after]);

@@ -10,10 +10,11 @@
 
 namespace proxarm::models {
 
-// Appends the n − 2 triangles of a polygon of n ≥ 3 corners, each counter-clockwise like the polygon about Newell's
-// normal (M. E. Newell's sum of cross products, which works for bent polygons, too). The polygon needn't be convex, and
-// its outline may touch itself: a seam may join a hole to the border. Returns false if the outline crosses itself or
-// has no area; the triangles then form a fan. Takes time n², or n³ if every ear is the last one tried.
+// Appends the n − 2 triangles of a polygon with n ≥ 3 corners. Each triangle is counter-clockwise about Newell's
+// normal, as the polygon is (M. E. Newell's sum of cross products, which is also defined for bent polygons). The
+// polygon needn't be convex, and its outline may touch itself: a seam may join a hole to the border. Returns false if
+// the outline crosses itself or has no area; the triangles are then a fan. Takes time n², or n³ if every ear is found
+// last.
 bool triangulate(std::span<const Vec3> vertices, std::span<const std::uint32_t> corners,
                  std::vector<std::array<std::uint32_t, 3>>& triangles);
 

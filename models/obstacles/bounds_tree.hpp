@@ -1,5 +1,5 @@
-// A bounding-volume tree of axis-aligned boxes: which objects are near a point, and how far is the nearest? Queries
-// allocate nothing and may come from any thread.
+// A bounding-volume tree of axis-aligned boxes. It finds the objects near a point, and the distance to the nearest
+// object. Queries don't allocate and may come from any thread.
 #pragma once
 
 #include <algorithm>
@@ -20,10 +20,10 @@ class BoundsTree {
   };
 
   BoundsTree() = default;
-  // Precondition: all bounds are finite, with low ≤ high. Boxes may be points, overlap or coincide.
+  // Precondition: all bounds are finite, with low ≤ high. Boxes may be points, may overlap and may coincide.
   explicit BoundsTree(std::vector<Leaf> leaves);
 
-  // Calls visit(index) once for each leaf whose box comes within `radius` of x, in no particular order.
+  // Calls visit(index) once for each leaf whose box is within `radius` of x, in no particular order.
   template <typename Visit>
   void within(const Vec3& x, double radius, Visit visit) const noexcept {
     if (nodes_.empty()) return;
@@ -42,9 +42,9 @@ class BoundsTree {
     }
   }
 
-  // The least of `least` and distance(index) over all leaves. Skips leaves whose box is no nearer than the best so far,
-  // unless x is in the box. Precondition: distance(index) is at least the distance to the leaf's box; it may be
-  // negative if x is in the box.
+  // Returns the minimum of `least` and of distance(index) over all leaves. Skips leaves whose box is no nearer to x
+  // than the smallest distance so far, unless x is in the box. Precondition: if x is outside a leaf's box,
+  // distance(index) is at least the distance from x to this box. (If x is in the box, distance(index) may be negative.)
   template <typename Distance>
   [[nodiscard]] double nearest(const Vec3& x, double least, Distance distance) const noexcept {
     if (nodes_.empty()) return least;
@@ -59,7 +59,8 @@ class BoundsTree {
         least = std::min(least, distance(node.index));
       } else {
         const bool left_first = distance2(nodes_[node.left].bounds, x) < distance2(nodes_[node.right].bounds, x);
-        stack[top++] = left_first ? node.right : node.left;  // the nearer one is visited next
+        // The nearer child is pushed last, so it is visited next.
+        stack[top++] = left_first ? node.right : node.left;
         stack[top++] = left_first ? node.left : node.right;
       }
     }
@@ -73,8 +74,8 @@ class BoundsTree {
     std::size_t index = 0;
     bool leaf = false;
   };
-  // Each level halves the leaves, and a search keeps one node of each level. Ten thousand objects need 15 places; 2³²
-  // leaves, more than indices can name, would need 33.
+  // Capacity of the stack. A search keeps one node of each level, and each level halves the leaves. So ten thousand
+  // objects need 15 places, and 2³² leaves, which is more than an index can count, would need 33.
   static constexpr int stack_depth_ = 80;
 
   static double distance2(const Bounds& b, const Vec3& x) noexcept {

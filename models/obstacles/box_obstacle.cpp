@@ -35,13 +35,15 @@ double BoxObstacle::rounding(const Vec3& x) const noexcept {
   return 16.0 * u * (x.lpNorm<1>() + centre_.lpNorm<1>() + half_.sum());
 }
 
-// The part of the way from q to p inside all three slabs: from `enter` (through face `face`) to `leave`.
+// The part of the path from q to p that is inside all three slabs: from `enter` (through face `face`) to `leave`. Both
+// are fractions of the path.
 struct BoxObstacle::Crossing {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();
-  int face = -1;                   // the face through which the way enters; -1: q is inside
-  std::array<double, 6> enters{};  // for each face: the fraction of the way that reaches its plane; negative unless q
-                                   // is on it or outside
+  int face = -1;  // the face through which the path enters; -1: q is inside
+  // For each face, the fraction of the path at which the path reaches the face's plane; negative unless q is on this
+  // plane or outside it.
+  std::array<double, 6> enters{};
 
   [[nodiscard]] bool any() const noexcept { return enter < leave && enter < 1.0 && leave > 0.0; }
 };
@@ -55,9 +57,10 @@ BoxObstacle::Crossing BoxObstacle::cross(const Vec3& q, const Vec3& p) const noe
     for (int s = 0; s < 2; ++s) {
       const double sign = s == 0 ? 1.0 : -1.0, from = sign * a[k] - half_[k], to = sign * b[k] - half_[k];
       const int face = 2 * k + s;
-      if (from >= -tolerance) {  // outside of this face or on it
+      if (from >= -tolerance) {  // q is outside this face or on it
         if (!(to < 0.0)) {
-          c.enter = std::numeric_limits<double>::infinity();  // p is outside of this face, too: the way misses the box
+          // p is outside this face, too, so the path misses the box.
+          c.enter = std::numeric_limits<double>::infinity();
           continue;
         }
         const double t = from > tolerance ? from / (from - to) : 0.0;
@@ -78,7 +81,7 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
   Crossing c = cross(q, p);
   if (!c.any()) return {p, Vec3::UnitZ(), 0, false, false};
   if (c.face < 0) {
-    // q is inside: out through the nearest face.
+    // q is inside the box: the proxy leaves through the nearest face.
     const Vec3 q_l = local(q);
     double least = std::numeric_limits<double>::infinity();
     for (int k = 0; k < 3; ++k) {
@@ -100,9 +103,9 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
     }
     return true;
   };
-  // The segment enters the box through the last plane that it crosses (slab method). So of the faces that hold the
-  // proxy, the one with the largest t counts; if several have the same t (q on an edge), the one that holds it nearest
-  // to p.
+  // The path enters the box through the last plane that it crosses (slab method). So among the faces that hold the
+  // proxy, the face with the largest t counts. If several faces have the same t (q is on an edge), the face that holds
+  // the proxy nearest to p counts.
   Step best;
   double best_t = -1.0, best_distance = 0.0;
   for (int face = 0; face < 6; ++face) {
@@ -110,7 +113,7 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
     if (t < 0.0) continue;
     const FaceStep<3> s = step_on_layer(faces_[static_cast<std::size_t>(face)], mu_, layer_, K, p, q);
     if (!s.touches || !on_face(face, s.r)) continue;
-    const double distance = s.slips ? (s.r - p).norm() : 0.0;  // sticking is preferred
+    const double distance = s.slips ? (s.r - p).norm() : 0.0;  // 0: sticking is preferred to slipping
     if (t > best_t || (t == best_t && distance < best_distance)) {
       best = {s.r, faces_[static_cast<std::size_t>(face)].normal(), face, true, s.slips};
       best_t = t;
@@ -122,8 +125,8 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
   return beside_face(c.face, K, p, q);
 }
 
-// The step ends beside the entered face. If p is past the same edge, the proxy is free; otherwise the edge holds it, or
-// the corner at the edge's end.
+// Finishes a step that ends beside the entered face. If p is beyond the edge that the step passed, the proxy is free.
+// Otherwise this edge holds the proxy, or the corner at the edge's end does.
 Obstacle::Step BoxObstacle::beside_face(std::int32_t face, double K, const Vec3& p, const Vec3& q) const noexcept {
   const FlatSurface<3>& entered = faces_[static_cast<std::size_t>(face)];
   const StepOnPlanes step{mu_, K, layer_, p, q};
@@ -158,11 +161,12 @@ bool BoxObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
   const Vec3 r_l = local(r);
   if ((half_ - r_l.cwiseAbs()).minCoeff() > 2.0 * rounding(r) + layer_.thickness_m) return true;
   const Crossing c = cross(q, r);
-  return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;  // r is beyond the box, and no way leads around
+  // r is beyond the box, and the proxy can't go around the box.
+  return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;
 }
 
-// Depth in a convex solid is a concave function, so at the middle of a chord it is at least half of the chord's
-// greatest depth.
+// Depth in a convex solid is a concave function. So at the middle of a chord, the depth is at least half of the
+// greatest depth on the chord.
 bool BoxObstacle::bars(const Vec3& x, const Vec3& y) const noexcept {
   const Crossing c = cross(x, y);
   if (!c.any()) return false;
@@ -170,7 +174,7 @@ bool BoxObstacle::bars(const Vec3& x, const Vec3& y) const noexcept {
   return distance(middle) < -2.0 * rounding(middle);
 }
 
-// The proxy slides along the entered face, from the point of entry to the face's edge.
+// The proxy slides along the entered face, from the point of entry to the edge of the face.
 Vec3 BoxObstacle::detour(const Vec3& p, const Vec3& q) const noexcept {
   const Crossing c = cross(q, p);
   if (!c.any() || c.face < 0 || step(1.0, p, q).touches) return q;

@@ -1,8 +1,8 @@
-// A solid box.
+// A solid box as an obstacle.
 //
-// The face through which the proxy's straight way enters holds it by (4). Beyond the face's edge it is free again, so
-// it can go around the box. If friction would hold the proxy beside the entered face, beyond an edge that p isn't
-// beyond, that edge holds it (edge_contact.hpp).
+// The face through which the straight path enters holds the proxy by (4). Beyond the edge of this face the proxy is
+// free again, so it can go around the box. Friction can make the step on the face end beyond an edge although p isn't
+// beyond this edge. Then this edge holds the proxy (edge_contact.hpp).
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@ namespace proxarm::models {
 
 class BoxObstacle final : public Obstacle {
  public:
-  // size_m: full edge lengths; a plate may be as thin as 10 µm. X: pose of the box in W. Throws std::invalid_argument
-  // for sizes that aren't finite and positive, and for a friction that isn't finite and ≥ 0.
+  // `size_m`: the full lengths of the edges; a plate may be as thin as 10 µm. `X`: the pose of the box in W. Throws
+  // std::invalid_argument if a size isn't finite and positive, or if the friction isn't finite or is negative.
   BoxObstacle(const Pose& X, const Vec3& size_m, double friction, const Layer& layer = {});
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
@@ -31,7 +31,8 @@ class BoxObstacle final : public Obstacle {
   [[nodiscard]] Bounds bounds() const noexcept override;
   void set_friction(double friction) noexcept override { mu_ = friction; }
 
-  // Faces 2 k and 2 k + 1 point along +axis k and −axis k. Boxes seen from inside use this too.
+  // Returns the six faces. Faces 2 k and 2 k + 1 have normals along +axis k and −axis k. Boxes seen from inside use
+  // this function too.
   static std::array<FlatSurface<3>, 6> faces(const Pose& X, const Vec3& size_m);
 
  private:

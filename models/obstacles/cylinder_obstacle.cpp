@@ -22,13 +22,15 @@ double CylinderObstacle::rounding(const Vec3& x) const noexcept {
   return 16.0 * u * (x.lpNorm<1>() + middle_.lpNorm<1>() + half_ + R_);
 }
 
-// The part of the way from q to p inside the cylinder: from `enter` (through `feature`) to `leave`.
+// The part of the path from q to p that is inside the cylinder: from `enter` (through `feature`) to `leave`. Both are
+// fractions of the path.
 struct CylinderObstacle::Crossing {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();
-  std::int32_t feature = -1;              // -1: q is inside
-  double enters[3] = {-1.0, -1.0, -1.0};  // for each feature: the fraction of the way that reaches it; negative unless
-                                          // q is on it or outside
+  std::int32_t feature = -1;  // the feature through which the path enters; -1: q is inside
+  // For each feature, the fraction of the path at which the path reaches the feature; negative unless q is on the
+  // feature or outside it.
+  double enters[3] = {-1.0, -1.0, -1.0};
 
   [[nodiscard]] bool any() const noexcept { return enter < leave && enter < 1.0 && leave > 0.0; }
   void enter_at(double t, std::int32_t by) noexcept {
@@ -56,7 +58,7 @@ CylinderObstacle::Crossing CylinderObstacle::cross(const Vec3& q, const Vec3& p)
       c.leave = std::min(c.leave, from / (from - to));
     }
   }
-  // Solves ‖u + t d‖ = R across the axis.
+  // The path crosses the side where ‖u + t d‖ = R, with u and d across the axis.
   const Vec3 u = radial(q), d = radial(p) - u;
   const double a = d.squaredNorm(), b = u.dot(d), from = u.norm() - R_;
   const double discriminant = b * b - a * (u.norm() + R_) * from;
@@ -96,7 +98,7 @@ Obstacle::Step CylinderObstacle::step(double K, const Vec3& p, const Vec3& q) co
     const Step s = alone(feature);
     if (!s.touches) continue;
     const bool on = feature == side ? std::abs(along(s.r)) <= half_ + tolerance : radial(s.r).norm() <= R_ + tolerance;
-    const double distance = s.slips ? (s.r - p).norm() : 0.0;  // sticking is preferred
+    const double distance = s.slips ? (s.r - p).norm() : 0.0;  // 0: sticking is preferred to slipping
     if (on && (t > best_t || (t == best_t && distance < best_distance))) {
       best = s;
       best_t = t;
@@ -108,8 +110,9 @@ Obstacle::Step CylinderObstacle::step(double K, const Vec3& p, const Vec3& q) co
   return beside_face(c.feature, alone(c.feature), K, p, q);
 }
 
-// The step `s` on the entered feature ends beyond the rim. If p is past the same rim, the proxy is free; otherwise the
-// rim holds it. Each point of the rim is an edge between the end and the side's tangent plane there.
+// Finishes the step `s` on the entered feature, which ends beyond the rim. If p is beyond the same rim, the proxy is
+// free. Otherwise the rim holds it: each point of the rim is an edge between the end and the side's tangent plane at
+// this point.
 Obstacle::Step CylinderObstacle::beside_face(std::int32_t feature, const Step& s, double K, const Vec3& p,
                                              const Vec3& q) const noexcept {
   const Step free{p, s.normal, 0, false, false};
@@ -120,10 +123,11 @@ Obstacle::Step CylinderObstacle::beside_face(std::int32_t feature, const Step& s
                       : radial(p).norm() > R_ && radial(p).dot(u) > 0.0) {
     return free;
   }
-  // Finds the place on the rim, as an angle from q's direction towards p's. On the rim's tangent there, the proxy is
-  // drawn towards p at the first angle and back towards q at the last.
+  // Finds the contact point on the rim, as an angle from the direction of q towards the direction of p. At angle 0 the
+  // step along the rim's tangent leads towards p, and at the last angle it leads back towards q.
   const Vec3 end = std::copysign(1.0, z) * e_, u_q = radial(q), first = (u_q.norm() > 0.0 ? u_q : u).normalized();
-  // p only chooses the tangent's sign: the part of p's direction across `first` may be almost zero.
+  // The sign of the tangent is chosen by p. The tangent isn't computed from p, because the part of p's direction across
+  // `first` may be almost zero.
   const Vec3 u_p = radial(p), tangent = e_.cross(first);
   const Vec3 onward = tangent.dot(u_p) < 0.0 ? Vec3(-tangent) : tangent;
   const StepOnPlanes step{side_.friction(), K, end_[0].layer(), p, q};
@@ -137,7 +141,8 @@ Obstacle::Step CylinderObstacle::beside_face(std::int32_t feature, const Step& s
   };
   const double last = std::atan2(onward.dot(u_p), first.dot(u_p)), nothing = 0.25 * rounding(p);
   const bool found = false_position(drawn_on, 0.0, last, nothing, 64.0 * nothing) && held.found;
-  held.r += (R_ - std::max(R_, radial(held.r).norm())) * out;  // where the tangent's point isn't quite on the rim
+  // A step along the tangent leaves the rim slightly; this moves the point back to the rim.
+  held.r += (R_ - std::max(R_, radial(held.r).norm())) * out;
   return {held.r, held.normal, feature, true, held.slips, found};
 }
 
@@ -147,8 +152,8 @@ bool CylinderObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
   return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;
 }
 
-// Depth in a convex solid is a concave function, so at the middle of a chord it is at least half of the chord's
-// greatest depth.
+// Depth in a convex solid is a concave function. So at the middle of a chord, the depth is at least half of the
+// greatest depth on the chord.
 bool CylinderObstacle::bars(const Vec3& x, const Vec3& y) const noexcept {
   const Crossing c = cross(x, y);
   if (!c.any()) return false;
@@ -167,7 +172,7 @@ Vec3 CylinderObstacle::detour(const Vec3& p, const Vec3& q) const noexcept {
     const Vec3 on_rim = from + (rise != 0.0 ? std::clamp(share, 0.0, 1.0) : 0.0) * d, u = radial(on_rim);
     return on_rim + (R_ / u.norm() - 1.0) * u;
   }
-  // Solves ‖u + t v‖ = R on the end.
+  // The path reaches the rim of the end where ‖u + t v‖ = R.
   const Vec3 u = radial(from), v = radial(d);
   const double a = v.squaredNorm(), b = u.dot(v), inside = std::max(0.0, R_ * R_ - u.squaredNorm());
   return a > 0.0 ? Vec3(from + std::min(1.0, (std::sqrt(b * b + a * inside) - b) / a) * d) : from;

@@ -1,7 +1,8 @@
-// A solid cylinder with flat ends.
+// A solid cylinder with flat ends as an obstacle.
 //
-// It works like a box: the side or end through which the proxy enters holds it, and beyond the rim it is free. A proxy
-// that friction would hold beside that face is held at the rim (edge_contact.hpp).
+// It works like a box: the side or end through which the path enters holds the proxy, and beyond the rim the proxy is
+// free. Friction can make the step on the side or end finish beyond the rim although p isn't beyond it. Then the rim
+// holds the proxy (edge_contact.hpp).
 #pragma once
 
 #include "models/obstacles/plane_obstacle.hpp"
@@ -11,8 +12,8 @@ namespace proxarm::models {
 
 class CylinderObstacle final : public Obstacle {
  public:
-  // from_m, to_m: the centres of the two ends. Throws std::invalid_argument if they coincide, and for a radius or a
-  // friction that isn't finite and ≥ 0.
+  // `from_m` and `to_m` are the centres of the two ends. Throws std::invalid_argument if these centres coincide, or if
+  // the radius or the friction isn't finite or is negative.
   CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction, const Layer& layer = {});
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
@@ -48,7 +49,7 @@ class CylinderObstacle final : public Obstacle {
   double R_;
   double depth_;  // the layer's thickness, m
   RoundBar side_;
-  PlaneObstacle end_[2];  // far, near
+  PlaneObstacle end_[2];  // far_end, near_end
 };
 
 }  // namespace proxarm::models

@@ -11,7 +11,8 @@ EdgeContact hold_at_edge(const Vec3& point, const Vec3& normal_1, const Vec3& no
   constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
   const double nothing = 4.0 * u * (point.lpNorm<1>() + step.q.lpNorm<1>());
   EdgeContact out{point, normal_1};
-  // How far the step on the plane n(θ) ends beyond the edge, towards the second face's side. Leaves that end in `out`.
+  // Returns how far the step on the plane with normal n(θ) ends beyond the edge, towards the side of the second face.
+  // Stores the end of the step, moved to the edge, in `out`.
   const auto beyond = [&](double theta) {
     out.normal = std::cos(theta) * normal_1 + std::sin(theta) * normal_2;
     const Vec3 across = std::cos(theta) * normal_2 - std::sin(theta) * normal_1;
@@ -30,12 +31,15 @@ EdgeContact hold_at_edge(const Vec3& point, const Vec3& normal_1, const Vec3& no
   return out;
 }
 
-// With f along r − p and d = r − q, (17) at a normal n says f/‖f‖ = cos β n − sin β v/‖v‖, tan β = μ, where v is the
-// part of d across n. So n is the direction of f turned by β towards the part of d across f.
+// The normal n at the corner follows from (17):
+// 1. The force f is along r − p, and the slip is d = r − q.
+// 2. (17) says f/‖f‖ = cos β n − sin β v/‖v‖, with tan β = μ, where v is the part of d perpendicular to n.
+// 3. So n is the direction of f, turned by β towards the part of d perpendicular to f.
 EdgeContact hold_at_corner(const Vec3& r, double mu, const Vec3& p, const Vec3& q) noexcept {
   const Vec3 force = (r - p).normalized(), d = r - q;
   const double cos = 1.0 / std::sqrt(1.0 + mu * mu), sin = mu * cos;
-  const double against = -force.dot(d) / d.norm();  // cosine of the angle between f and the way back
+  // Cosine of the angle between f and the direction from r back to q.
+  const double against = -force.dot(d) / d.norm();
   if (against >= cos) return {r, -d.normalized()};
   const Vec3 aside = (d - force * force.dot(d)).normalized();
   return {r, cos * force + sin * aside, mu > 0.0};

@@ -1,10 +1,11 @@
-// Contact at a convex edge or corner of a solid where friction holds the proxy.
+// Solves the contact of a proxy that friction holds at a convex edge or corner of a solid.
 //
-// A face's plane holds nothing beyond the face's edge. For a proxy that comes from beside an edge, the step on each of
-// the two planes may end beyond the edge, although p is inside. The edge itself then holds the proxy, with a normal
-// between those of the faces, n(θ) = cos θ n₁ + sin θ n₂: the one for which (17), on the plane through the edge, ends
-// on the edge. From θ = 0 to 90° that end moves from one side of the edge to the other, so such a θ exists. Coulomb's
-// law allows several; the one nearest to the entered face is taken.
+// A face exerts no force beyond its edge. If the proxy comes from beside an edge, the step on each face's plane may end
+// beyond the edge, although p is inside the solid. Then the edge itself holds the proxy:
+// 1. The normal is between the normals of the faces: n(θ) = cos θ n₁ + sin θ n₂.
+// 2. For the right θ, the step by (17) on the plane through the edge with normal n(θ) ends on the edge.
+// 3. From θ = 0 to 90°, the end of this step moves from one side of the edge to the opposite side, so such a θ exists.
+// 4. If Coulomb's law allows several θ, the code takes the θ whose normal is nearest to the entered face's normal.
 #pragma once
 
 #include <cmath>
@@ -24,7 +25,7 @@ struct EdgeContact {
 // The data of a step that is solved on several planes.
 struct StepOnPlanes {
   double mu, K;
-  Layer layer;  // a copy: a cylinder passes a temporary
+  Layer layer;  // a copy, because a cylinder passes a temporary
   const Vec3 &p, &q;
 
   [[nodiscard]] FaceStep<3> on(const FlatSurface<3>& surface) const noexcept {
@@ -32,9 +33,9 @@ struct StepOnPlanes {
   }
 };
 
-// Solves error(x) = 0 by false position (the Illinois variant) with a bisection every fourth step. Expects error > 0 at
-// low and error < 0 at high, and returns false otherwise. Ends when |error| ≤ `nothing` or no double is left between.
-// Returns false if error(x) jumps past zero by more than `near`.
+// Solves error(x) = 0 by false position (the Illinois variant), with a bisection every fourth step. Returns false
+// unless error(low) > 0 and error(high) < 0. Ends when |error| ≤ `nothing` or when no double is left between low and
+// high. Returns false if |error| > `near` at the end, because error(x) jumps past zero.
 template <typename Error>
 bool false_position(Error error, double low, double high, double nothing, double near) noexcept {
   double at_high = error(high);
@@ -57,13 +58,15 @@ bool false_position(Error error, double low, double high, double nothing, double
   return std::abs(now) <= near;
 }
 
-// Holds the proxy at the straight edge through `point` where two faces meet at a right angle, with the normal nearest
-// to the first face's. Precondition: p is behind both faces, and the step on the first ends beyond the edge.
+// Holds the proxy at the straight edge through `point` where two faces meet at a right angle. If several normals are
+// possible, takes the normal nearest to `normal_1`. Precondition: p is behind both faces, and the step on the first
+// face ends beyond the edge.
 EdgeContact hold_at_edge(const Vec3& point, const Vec3& normal_1, const Vec3& normal_2,
                          const StepOnPlanes& step) noexcept;
 
-// Holds the proxy at the corner r. It sticks if the direction back to q can be the normal. Otherwise the normal puts
-// the force on the edge of the friction cone, against the slip. Precondition: r is neither p nor q.
+// Holds the proxy at the corner r. The proxy sticks if the normal can have the direction from r back to q. Otherwise
+// the normal puts the force on the line of the friction cone that opposes the slip. Precondition: r equals neither p
+// nor q.
 EdgeContact hold_at_corner(const Vec3& r, double mu, const Vec3& p, const Vec3& q) noexcept;
 
 }  // namespace proxarm::models

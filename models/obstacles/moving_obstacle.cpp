@@ -9,8 +9,8 @@ void MovingObstacle::go_from(const Pose& before) noexcept {
   now_inverse_ = now_.inverse(Eigen::Isometry);
   before_inverse_ = before.inverse(Eigen::Isometry);
   shortened_ = false;
-  // The size is at least a metre and rounded up to a power of two, so that it rarely changes: at each change a mesh
-  // forgets its warm start.
+  // The size is at least a metre, and is rounded up to a power of two so that it rarely changes. This matters because a
+  // mesh forgets its warm start at each change.
   const double size = std::max({1.0, now_.translation().lpNorm<1>(), before.translation().lpNorm<1>()});
   if (std::isfinite(size)) still_->set_rounding_size(std::ldexp(1.0, std::ilogb(size) + 1));
 }
@@ -43,9 +43,9 @@ void MovingObstacle::set_time(double time_s, double period_s) noexcept {
   shortened_ = shorter;
 }
 
-// Returns q in the object's frame, carried along by the object's motion. At order 2 a second call in a step comes from
-// q̃ = q₁ + (q₁ − q₂)/3, with the period 2T/3. If the object's motion isn't uniform, q̃ may be behind a mesh. The
-// result is then the point that a step from q₁ towards q̃ reaches.
+// Returns q in the object's frame, carried along by the object's motion. At order 2, a second call in a step starts at
+// q̃ = q₁ + (q₁ − q₂)/3 with the period 2T/3. If the object's motion isn't uniform, q̃ may be behind a mesh. The result
+// is then the point that a step from q₁ towards q̃ reaches.
 Vec3 MovingObstacle::from(const Vec3& q) const noexcept {
   const Vec3 q_O = before_inverse_ * q;
   if (!shortened_) {
@@ -56,13 +56,13 @@ Vec3 MovingObstacle::from(const Vec3& q) const noexcept {
   return still_->parts(whole_from_, q_O, normal) ? still_->step(1.0, q_O, whole_from_).r : q_O;
 }
 
-// Takes a touched point from the object's frame to W. A proxy that sticks to a resting object stays bit for bit.
+// Returns a touched point in W. If the proxy sticks to a resting object, the result is q, bit for bit.
 Vec3 MovingObstacle::to_W(const Vec3& r_O, const Vec3& q_O, const Vec3& q) const noexcept {
   if (rests_ && r_O == q_O) return q;
   Vec3 r = now_ * r_O, moved = r_O, normal;
-  // The next step takes r back to the object's frame, with rounding. If r_O is within rounding of an untouched face
-  // (beside a vertex, deep in a spike), that face may lie between r_O and its image. r then moves away from that face,
-  // farther with each try; 24 tries add up to 8190 times the first distance.
+  // The next step transforms r back to the object's frame, with rounding. If r_O is within rounding of an untouched
+  // face (beside a vertex, deep in a spike), the transformed r may be behind that face. Then r is moved away from that
+  // face, by a greater distance with each try. The 24 tries move r by up to 8190 times the first distance.
   double away = 16.0 * std::numeric_limits<double>::epsilon() * (r.lpNorm<1>() + now_.translation().lpNorm<1>());
   for (int k = 0; k < 24 && still_->parts(r_O, now_inverse_ * r, normal); ++k) {
     moved += away * normal;

@@ -1,13 +1,14 @@
-// An obstacle that moves by a script or is driven from outside.
+// An obstacle that moves by a script, or that is driven from outside.
 //
-// The step happens in the object's frame, where the object stands still. q there is X(t − T)⁻¹ q, carried along by the
-// object's motion, and p is X(t)⁻¹ p. So friction acts against the relative motion, and the object can sweep onto a
-// resting proxy, with rigid surfaces and elastic layers alike.
+// A step is made in the object's frame, in which the object stands still. In this frame q is X(t − T)⁻¹ q, because the
+// object's motion carries q along, and p is X(t)⁻¹ p. So friction acts against the relative motion, and the object can
+// move onto a resting proxy and push it. This is true for rigid surfaces and for elastic layers.
 //
-// A mesh can't push back a proxy that got behind a face, so rounding between its frame and W must never take the proxy
-// through one. The touched surface is in front of the faces by more than this rounding (Obstacle::set_rounding_size). A
-// point in W is returned only after a test of its image in the object's frame. And each step starts, bit for bit, from
-// the pose at which the last step ended.
+// A mesh can't push back a proxy that got behind a face. So rounding between the mesh's frame and W must never take the
+// proxy through a face. Three rules prevent this:
+// - The touched surface is in front of the faces by more than this rounding (Obstacle::set_rounding_size).
+// - A point in W is returned only after a test of the same point, transformed back to the object's frame.
+// - Each step starts, bit for bit, from the pose of the object at which the last step ended.
 #pragma once
 
 #include <memory>
@@ -19,27 +20,27 @@ namespace proxarm::models {
 
 class MovingObstacle final : public Obstacle {
  public:
-  // `still`: the object at the place where the scene describes it.
+  // A scripted object. `still`: the object at the pose that the scene describes.
   MovingObstacle(std::unique_ptr<Obstacle> still, const ScriptedMotion& motion)
       : still_(std::move(still)), motion_(motion), scripted_(true) {
     last_ = now_ = motion_.at(0.0);
     go_from(now_);
   }
-  // A driven object; it stands at `start` until drive() is called.
+  // A driven object. It stands at `start` until the first call of drive().
   MovingObstacle(std::unique_ptr<Obstacle> still, const Pose& start)
       : still_(std::move(still)), now_(orthonormalised(start)), driven_from_(now_) {
     go_from(now_);
   }
 
-  // Sets the pose for the next step; the object moves there from the pose of the last call. Call it once before each
-  // step. A rotation that isn't orthonormal within rounding is made so.
+  // Sets the object's pose at the end of the next step. In this step the object moves from the pose of the last call to
+  // this pose. Call it once before each step. A rotation that isn't orthonormal within rounding is orthonormalised.
   void drive(const Pose& X) noexcept {
     driven_from_ = now_;
     now_ = orthonormalised(X);
     go_from(driven_from_);
   }
 
-  // At order 2 it is called a second time for the same time, with a shorter period: see from().
+  // At order 2 this is called twice for the same time; the second call has a shorter period. See from().
   void set_time(double time_s, double period_s) noexcept override;
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
@@ -52,7 +53,7 @@ class MovingObstacle final : public Obstacle {
   [[nodiscard]] std::size_t contacts(double K, const Vec3& p, const Vec3& q, const Step& s,
                                      std::array<Contact<3>, 3>& out) const noexcept override;
 
-  // Precondition: q has been carried along already; World does that.
+  // Precondition: q is already carried along by the object's motion; World calls carry() for this.
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     return still_->excludes(now_inverse_ * q, now_inverse_ * r);
   }
@@ -96,13 +97,14 @@ class MovingObstacle final : public Obstacle {
   bool scripted_ = false;
   Pose now_ = Pose::Identity();
   Pose now_inverse_ = Pose::Identity(), before_inverse_ = Pose::Identity();
-  bool rests_ = true;  // both poses are equal
-  // The pose before this step: a scripted object's at the last time, a driven object's at the last call of drive().
+  bool rests_ = true;  // the pose before this step equals the pose after it
+  // The pose before this step: for a scripted object the pose at the last time, for a driven object the pose at the
+  // last call of drive().
   Pose last_ = Pose::Identity(), driven_from_ = Pose::Identity();
   double time_s_ = 0.0, last_time_s_ = 0.0;
   double whole_period_s_ = 0.0;
   bool shortened_ = false;
-  mutable Vec3 whole_from_ = Vec3::Zero();  // last result of from() for a whole period
+  mutable Vec3 whole_from_ = Vec3::Zero();  // the last result of from() for a step of the whole period
 };
 
 }  // namespace proxarm::models

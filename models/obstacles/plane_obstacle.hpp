@@ -1,4 +1,4 @@
-// A half-space among other obstacles: (2) and (4), optionally with an elastic layer.
+// A half-space as an obstacle: (2) and (4), with or without an elastic layer.
 #pragma once
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace proxarm::models {
 
 class PlaneObstacle final : public Obstacle {
  public:
-  // Throws std::invalid_argument for a normal without a direction or a friction that isn't finite and ≥ 0.
+  // Throws std::invalid_argument if the normal has no direction, or if the friction isn't finite or is negative.
   PlaneObstacle(const Vec3& point_m, const Vec3& normal, double friction, const Layer& layer = {})
       : surface_(point_m, normal), mu_(friction), layer_(layer) {
     if (!std::isfinite(friction) || !(friction >= 0.0)) {
@@ -40,9 +40,10 @@ class PlaneObstacle final : public Obstacle {
   }
   [[nodiscard]] double distance(const Vec3& x) const noexcept override { return surface_.height(x); }
   void set_friction(double friction) noexcept override { mu_ = friction; }
-  // A point may be behind the surface by this many units of rounding: 1 for a single surface, about 8 for two
-  // half-spaces back to back (a plane guide), where a point on one is behind the other by the rounding of both. Beyond
-  // 500 (1e-12 m within a metre) the contract's "never inside" would fail.
+  // Sets how far a point may be behind the surface, in units of rounding(). For a single surface it is 1. For a plane
+  // guide, which is two half-spaces back to back, it is about 8: a point on one half-space is behind the other
+  // half-space by the rounding of both. Beyond 500 (1e-12 m within a metre of the origin), the contract's "never
+  // inside" would fail.
   void set_slack(double roundings) noexcept { slack_ = roundings; }
   [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
 

@@ -13,10 +13,10 @@ typename RoundObstacle<Core>::Step RoundObstacle<Core>::step(double K, const Vec
   }
   const At at_q = at(core_, q, p);
   const double q_rounding = rounding(q);
-  // s = 0: the proxy sticks at q, or at the surface point below q.
+  // Tries s = 0: the proxy sticks at q, or at the surface point below q.
   Trial trial = stick(K, p, q, at_q, q_rounding);
   if (!(trial.excess > 0.0) && trial.f_n >= 0.0) return {trial.r, trial.normal, 0, true, false};
-  if (!(at_p.height < 0.0)) return {p, at_p.normal, 0, false, false};  // goes around a solid
+  if (!(at_p.height < 0.0)) return {p, at_p.normal, 0, false, false};  // the proxy goes around a solid
   return slide(K, p, q, trial.excess);
 }
 
@@ -27,8 +27,8 @@ typename RoundObstacle<Core>::Step RoundObstacle<Core>::slide(double K, const Ve
   const double s_0 = core_.closest_on_way(q, way);
   const Vec3 o = q + s_0 * way, q_o = q - o, p_o = p - o;
   const Core core = core_.seen_from(o);
-  // If the way passes the core by less than a sixteenth of a unit in the last place, rounding would choose anew for
-  // each t the side on which r turns around. The side is chosen once here.
+  // If the distance of the path from the core is less than a sixteenth of a unit in the last place, rounding would
+  // decide for each t on which side of the core r turns. `aside` chooses this side once for all t.
   const double length = way.norm(), closest = core.nearest(Vec3::Zero()).norm(), least = rounding(q) / 256.0;
   const Vec3 across = way.cross(at(core, p_o, q_o).normal);
   const Vec3 aside = closest < least && across.norm() > 0.0 ? Vec3(least * across.normalized()) : Vec3(Vec3::Zero());

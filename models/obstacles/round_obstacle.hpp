@@ -1,21 +1,23 @@
-// Spheres, capsules and round bars, solid or seen from inside: the points at distance R ≥ 0 from a core, which is a
-// point, a segment or a line.
+// Spheres, capsules and round bars as obstacles, solid or hollow (touched from inside). Their surface is the set of the
+// points at distance R ≥ 0 from a core. The core is a point, a segment or a line.
 //
-// The normal at r lies along the line from the core through r. In units where K = 1, friction is −λ N Nᵀ (r − q) with
-// an unknown λ ≥ 0, so the tangential balance is
-//   N Nᵀ [(r − p) + λ (r − q)] = (1 + λ) N Nᵀ (r − p') = 0   with p' = (p + λ q)/(1 + λ):
-// r is the surface point nearest to p', as without friction it is nearest to p. With s = 1/(1 + λ), p' = q + s (p − q),
-// and the friction cone leaves one scalar equation for s:
-//   r(s) = nearest to q + s (p − q),   ‖f_t(r(s))‖ = μ f_n(r(s)),   0 ≤ s ≤ 1.
-// s = 1 is frictionless, s = 0 is stick (r nearest to q). On a plane the equation is linear in s and gives (4). The
-// secant method, safeguarded by bisection, solves it.
+// The step is derived as follows:
+// 1. The surface normal at r lies along the line from the core through r. N Nᵀ projects onto the tangent plane at r.
+// 2. In units where K = 1, friction is −λ N Nᵀ (r − q) with an unknown λ ≥ 0. So the tangential balance is
+//      N Nᵀ [(r − p) + λ (r − q)] = (1 + λ) N Nᵀ (r − p') = 0   with p' = (p + λ q)/(1 + λ).
+// 3. So r is the surface point nearest to p', whereas without friction r is the surface point nearest to p.
+// 4. With s = 1/(1 + λ), p' = q + s (p − q). The friction cone gives one scalar equation for s:
+//      r(s) = nearest to q + s (p − q),   ‖f_t(r(s))‖ = μ f_n(r(s)),   0 ≤ s ≤ 1.
+//    At s = 1 there is no friction; at s = 0 the proxy sticks (r is nearest to q).
+// On a plane this equation is linear in s and gives (4). The code solves it by the secant method, with bisections.
 //
-// If the way from q to p passes close to the core, at o = q + s₀ (p − q), r turns around within about a fraction σ =
-// ‖o − core‖/‖p − q‖ of the way, which may be tiny. So coordinates are relative to o, the unknown is t = s − s₀, and
-// bisection halves asinh(t/σ). If the way passes through the core itself, r jumps to p's side and the proxy sticks
-// there: N(r − q) = 0.
+// If the path from q to p passes close to the core, at o = q + s₀ (p − q), r turns around the core within a fraction of
+// about σ = ‖o − core‖/‖p − q‖ of the path, and σ may be tiny. So the code uses coordinates relative to o, the unknown
+// t = s − s₀, and bisections that halve an interval of asinh(t/σ). If the path passes through the core itself, r jumps
+// to the side of p and the proxy sticks there, because N(r − q) = 0.
 //
-// The space around a solid isn't convex: if p is past the solid, the proxy sticks if it can, and otherwise goes around.
+// The region outside a solid isn't convex. If p is beyond the solid, the proxy sticks if it can; otherwise it goes
+// around the solid.
 #pragma once
 
 #include <algorithm>
@@ -27,13 +29,14 @@
 
 namespace proxarm::models {
 
-// The t, 0 ≤ t ≤ 1, at which q + t d is closest to a point.
+// Returns the t in 0 ≤ t ≤ 1 at which q + t d is closest to the point x.
 inline double closest_to_point(const Vec3& q, const Vec3& d, const Vec3& x) noexcept {
   const double length2 = d.squaredNorm();
   return length2 > 0.0 ? std::clamp(d.dot(x - q) / length2, 0.0, 1.0) : 0.0;
 }
 
-// The same for the infinite line through a along e (unit); 0 if d is parallel to it.
+// Returns the t in 0 ≤ t ≤ 1 at which q + t d is closest to the infinite line through a along e (unit), or 0 if d is
+// parallel to this line.
 inline double closest_to_line(const Vec3& q, const Vec3& d, const Vec3& a, const Vec3& e) noexcept {
   const Vec3 across = d - e * e.dot(d);
   return closest_to_point(q, across, q + (a - q) - e * e.dot(a - q));
@@ -57,8 +60,8 @@ struct SegmentCore {
       : a(from), end((to - from).norm()), e(end > 0.0 ? Vec3((to - from) / end) : Vec3(Vec3::UnitZ())) {}
 
   [[nodiscard]] Vec3 nearest(const Vec3& x) const noexcept { return a + std::clamp(e.dot(x - a), begin, end) * e; }
-  // The distance to a segment is the distance to its line or to one of its ends. Each of these has a single minimum
-  // along the way; the least is the answer.
+  // The distance to a segment is the distance to the segment's line or to one of its ends. Each of these three
+  // distances has a single minimum along the path. The function returns the t of the least minimum.
   [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
     double best = 0.0, least = std::numeric_limits<double>::infinity();
     for (const double t :
@@ -78,8 +81,8 @@ struct SegmentCore {
     const Vec3 b = a + end * e;
     return {a.cwiseMin(b), a.cwiseMax(b)};
   }
-  // The core relative to `origin`. Moves the reference point along the line to the point nearest to `origin`, so that a
-  // distant end adds no rounding to coordinates near it.
+  // Returns the core relative to `origin`. The reference point `a` becomes the point of the line nearest to `origin`,
+  // so that a distant end adds no rounding to coordinates near `origin`.
   [[nodiscard]] SegmentCore seen_from(const Vec3& origin) const noexcept {
     SegmentCore core = *this;
     const double ahead = e.dot(origin - a);
@@ -90,11 +93,11 @@ struct SegmentCore {
   }
 
   Vec3 a;
-  double begin = 0.0, end;  // along e, relative to a
+  double begin = 0.0, end;  // the segment's ends along e, relative to a
   Vec3 e;
 };
 
-// An infinite line along e: the core of a cylinder's side, which the cylinder's ends cut off.
+// An infinite line along e. It is the core of a cylinder's side.
 struct LineCore {
   Vec3 a = Vec3::Zero();
   Vec3 e = Vec3::UnitZ();  // unit
@@ -114,8 +117,8 @@ struct LineCore {
 template <typename Core>
 class RoundObstacle final : public Obstacle {
  public:
-  // inside: the free side is towards the core. With R = 0 the core itself then holds the proxy, like a guide. Throws
-  // std::invalid_argument for a radius or a friction that isn't finite and ≥ 0.
+  // `inside`: the free side is towards the core. With `inside` and R = 0, the proxy stays on the core, as on a guide.
+  // Throws std::invalid_argument if the radius or the friction isn't finite or is negative.
   RoundObstacle(const Core& core, double radius_m, double friction, bool inside, const Layer& layer = {})
       : core_(core), R_(radius_m), mu_(friction), sign_(inside ? -1.0 : 1.0), layer_(layer) {
     if (!std::isfinite(radius_m) || !(radius_m >= 0.0)) {
@@ -135,7 +138,8 @@ class RoundObstacle final : public Obstacle {
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     const double hard = at(core_, r, q).height + (layer_.soft() ? layer_.thickness_m : 0.0);
     if (hard < -4.0 * rounding(r)) return true;
-    return sign_ > 0.0 && passes(q, r) && step(1.0, r, q).touches;  // r is beyond a solid that would have held it
+    // r is beyond a solid that would have held the proxy.
+    return sign_ > 0.0 && passes(q, r) && step(1.0, r, q).touches;
   }
 
   [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override {
@@ -159,21 +163,22 @@ class RoundObstacle final : public Obstacle {
   [[nodiscard]] double friction() const noexcept { return mu_; }
 
  private:
-  // A point x as seen from the core.
+  // A point x relative to the core and the surface.
   struct At {
     Vec3 foot;      // the core's point nearest to x
-    Vec3 normal;    // the surface's normal nearest to x
-    double height;  // above the surface, positive on the free side
+    Vec3 normal;    // the surface's normal at the surface point nearest to x
+    double height;  // height of x above the surface, positive on the free side
   };
 
   struct Trial {
     Vec3 r;
     Vec3 normal;
-    double f_n = 0.0;     // over K
-    double excess = 0.0;  // ‖f_t‖ − μ f_n, over K
+    double f_n = 0.0;     // normal force divided by K
+    double excess = 0.0;  // ‖f_t‖ − μ f_n, divided by K
   };
 
-  // On the core every direction is a normal; the one towards `other` is taken.
+  // Returns the data of x. If x is on the core, every direction is a normal, and the direction towards `other` is
+  // taken.
   [[nodiscard]] At at(const Core& core, const Vec3& x, const Vec3& other) const noexcept {
     const Vec3 foot = core.nearest(x);
     Vec3 d = x - foot;
@@ -190,20 +195,21 @@ class RoundObstacle final : public Obstacle {
     return {foot, (sign_ / distance) * d, sign_ * (measured - R_)};
   }
 
-  // As FlatSurface::rounding, with the core instead of the point. Its reserve also covers the square root here.
+  // Returns the rounding of a height, as FlatSurface::rounding does, with the core instead of the plane's point. The
+  // reserve of FlatSurface::rounding also covers the square root here.
   [[nodiscard]] double rounding(const Vec3& x) const noexcept {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
     return 16.0 * u * (x.lpNorm<1>() + core_.size() + R_);
   }
 
-  // The proxy on the line through `line.foot` along `line.normal`: on the surface, or, within a layer, where the forces
-  // along the normal balance.
+  // Returns the position of the proxy on the line through `line.foot` along `line.normal`: on the surface or, within a
+  // layer, where the forces along the normal balance.
   [[nodiscard]] Trial place(double K, const Vec3& p, const At& line) const noexcept {
     const Vec3& n = line.normal;
-    const double along_p = n.dot(p - line.foot);  // p's coordinate along the normal, from the core
+    const double along_p = n.dot(p - line.foot);  // p's coordinate along the normal, from line.foot
     double along = sign_ * R_;
     if (layer_.soft()) {
-      // K (along − along_p) = k (surface − along), limited to the layer's thickness.
+      // The balance is K (along − along_p) = k (surface − along), and the layer yields by its thickness at most.
       const double k = layer_.stiffness_N_per_m;
       along = std::max((K * along_p + k * along) / (K + k), along - layer_.thickness_m);
     }
@@ -211,15 +217,16 @@ class RoundObstacle final : public Obstacle {
   }
 
   [[nodiscard]] Trial stick(double K, const Vec3& p, const Vec3& q, const At& at_q, double q_rounding) const noexcept {
-    if (!layer_.soft() && std::abs(at_q.height) <= q_rounding) return judge(p, q, at_q.normal);  // bit for bit
+    // If q is on the surface, the proxy sticks at q itself, bit for bit.
+    if (!layer_.soft() && std::abs(at_q.height) <= q_rounding) return judge(p, q, at_q.normal);
     Trial trial = place(K, p, at_q);
     if (layer_.soft() && (trial.r - q).norm() <= q_rounding) trial.r = q;
     return trial;
   }
 
-  // Solves ‖f_t‖ = μ f_n for t = s − s₀. The excess ‖f_t‖ − μ f_n brackets the root: −μ f_n at s = 1, without
-  // tangential force, and `excess_at_q` > 0 at s = 0. In between it is nearly linear (on a plane exactly), so the
-  // secant method takes a few steps.
+  // Solves ‖f_t‖ = μ f_n for t = s − s₀. The root is bracketed by the excess ‖f_t‖ − μ f_n: at s = 1 it is −μ f_n,
+  // because there is no tangential force, and at s = 0 it is `excess_at_q` > 0. Between them the excess is nearly
+  // linear (on a plane exactly linear), so the secant method needs few steps.
   [[nodiscard]] Step slide(double K, const Vec3& p, const Vec3& q, double excess_at_q) const noexcept;
 
   [[nodiscard]] Trial judge(const Vec3& p, const Vec3& r, const Vec3& n) const noexcept {
@@ -230,7 +237,7 @@ class RoundObstacle final : public Obstacle {
     return trial;
   }
 
-  // Whether the straight way from q to p passes through the inside.
+  // Whether the straight path from q to p passes through the inside of the surface.
   [[nodiscard]] bool passes(const Vec3& q, const Vec3& p) const noexcept {
     const Vec3 x = q + core_.closest_on_way(q, p - q) * (p - q);
     return (x - core_.nearest(x)).norm() < R_ - rounding(x);

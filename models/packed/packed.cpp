@@ -12,7 +12,7 @@ std::string packed(std::string_view bytes) {
   constexpr int level = 1;
   std::string frame(ZSTD_compressBound(bytes.size()), '\0');
   const std::size_t size = ZSTD_compress(frame.data(), frame.size(), bytes.data(), bytes.size(), level);
-  if (ZSTD_isError(size) != 0) throw std::runtime_error(ZSTD_getErrorName(size));  // out of memory
+  if (ZSTD_isError(size) != 0) throw std::runtime_error(ZSTD_getErrorName(size));  // the library is out of memory
   frame.resize(size);
   return frame;
 }

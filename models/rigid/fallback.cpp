@@ -2,19 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace proxarm::models {
-namespace {
-
-constexpr std::size_t kMostPlanes = 8;  // more contacts than hold a tool
-
-}  // namespace
-
 // Whether the tool may be at a pose, by the sides on which it was: no gap is below 0. Sides say nothing about a pose
 // further away than they reach.
 bool Fallback::has_room(const ToolPose& pose) noexcept {
   if (state_->sides.came_m(state_->bodies, pose) > state_->sides.reach_m()) return false;
-  iteration_->local().find(pose);
+  search_.find(pose);
   const std::span<const Found> all = std::as_const(state_->touches).all();
   return !attempt_->overflow &&
          std::all_of(all.begin(), all.end(), [](const Found& found) { return found.touch.gap >= -kGap_m; });
@@ -52,17 +47,17 @@ ToolPose Fallback::along_with_holder(const ToolPose& q) const noexcept {
 // Objects that the tool touches are mostly on the other side of a plane through a contact, and so are their neighbours:
 // those planes are tried first.
 bool Fallback::stands_in(const ToolPose& pose) noexcept {
-  std::array<Vec3, kMostPlanes> normals;
+  std::array<Vec3, Overlaps::most_planes> normals;
   const LocalProblem& local = state_->local;
   const std::size_t count = std::min(local.count, normals.size());
-  for (std::size_t k = 0; k < count; ++k) normals[k] = -state_->touches.found[local.found[k]].touch.normal;
+  for (std::size_t k = 0; k < count; ++k) normals[k] = -state_->touches.found[local.touch_of[k]].touch.normal;
   return overlaps_.overlap_m(pose, {.enough = -kGap_m, .normals = {normals.data(), count}}) < -kGap_m;
 }
 
 // Where a mesh bends both ways, as at a valley's end, a corner of the tool may be behind faces and have its foot on
 // none of them: nothing then holds it, and it would go in, though all else rests where it did. And among solids an
 // iterate may have left all that pressed in the one before, over an edge, while p̂ is inside.
-bool Fallback::went_in(const ToolPose& q_old, ToolPose& q) noexcept {
+bool Fallback::take_back_if_in(const ToolPose& q_old, ToolPose& q) noexcept {
   if (!may_be_in()) return false;
   const bool approaches = state_->bodies.something_approaches();
   if (approaches) state_->bodies.move_to(1.0);  // all the way, though the tool's parts may have ended before

@@ -1,17 +1,18 @@
 // Where the tool goes if a part of a step has no solution, or leads it into an object.
 #pragma once
 
-#include "models/rigid/iteration.hpp"
 #include "models/rigid/overlaps.hpp"
+#include "models/rigid/rigid_state.hpp"
+#include "models/rigid_gaps/touch_search.hpp"
 
 namespace proxarm::models {
 
 class Fallback {
  public:
-  Fallback(RigidState& state, Attempt& attempt, Iteration& iteration) noexcept
+  Fallback(RigidState& state, Attempt& attempt) noexcept
       : state_(&state),
         attempt_(&attempt),
-        iteration_(&iteration),
+        search_(state.bodies, state.candidates, state.sides, attempt, state.touches),
         overlaps_(state.bodies, state.candidates, state.last_planes) {}
 
   // While an object moves, the tool can't just stay. It goes where it has room: where it was, or where that is on an
@@ -23,8 +24,8 @@ class Fallback {
 
   // Whether the tool stands in an object at a pose, by its whole bodies. Costs a look at all of them.
   [[nodiscard]] bool stands_in(const ToolPose& pose) noexcept;
-  // The same, if the step may have led it in; then it goes back to where it was, or where that is now.
-  bool went_in(const ToolPose& q_old, ToolPose& q) noexcept;
+  // The same, if the step may have led it in; then q goes back to where it was, or where that is now.
+  bool take_back_if_in(const ToolPose& q_old, ToolPose& q) noexcept;
   [[nodiscard]] bool may_be_in() const noexcept { return state_->bodies.setup().dense || attempt_->lost_contact; }
 
  private:
@@ -33,7 +34,7 @@ class Fallback {
 
   RigidState* state_;
   Attempt* attempt_;
-  Iteration* iteration_;
+  TouchSearch search_;
   Overlaps overlaps_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "models/rigid_features/near.hpp"
 
@@ -117,14 +118,12 @@ double room_between(const RigidState& state, std::uint16_t part, std::uint16_t e
   const Vec3 middle = 0.5 * (e.bounds.low + e.bounds.high);
   const Vec3 away = at * (own.box.finite() ? Vec3(0.5 * (own.box.low + own.box.high)) : Vec3(Vec3::Zero())) - middle;
   if (away.squaredNorm() > 0.0) between.try_normal(away.normalized());
-  const Placement* on = state.bodies.placement(entry);
   int tried = 0;
   for (const Found& found : state.touches.all()) {
     if (tried == kNormals) break;
     const Pair& pair = state.candidates.pairs[found.pair];
     if (pair.part != part || pair.entry != entry) continue;
-    const Vec3& n = found.touch.normal;
-    between.try_normal(on == nullptr ? n : Vec3(on->R.transpose() * n));
+    between.try_normal(state.bodies.direction_in_object(entry, found.touch.normal));
     ++tried;
   }
   const double bound = between.bound();

@@ -72,14 +72,14 @@ Iteration::Next Iteration::iterate(const ToolPose& p_hat, const ToolPose& q_old,
   feet.over = std::isfinite(at.last_m) ? std::clamp(at.last_m, beside_m, kBesideAtMost_m) : beside_m;
   feet.beside = at.k < kToAndFro ? beside_m : feet.over;
   const Twist e = difference(q, p_hat);
-  local_.find(q, local_.may_leave_out() ? kWithin * state_->bodies.size_m(e) : Touches::everywhere_m);
+  local_step_.find(q, local_step_.may_leave_out() ? kWithin * state_->bodies.size_m(e) : Touches::everywhere_m);
   const bool roughly = attempt_->bends && at.k > 0 && at.last_m > kNear_m;
   const double rough = roughly ? kRoughShare * std::min(at.last_m / state_->bodies.motion_m(q, p_hat), 1.0) : 0.0;
   const double still_m = attempt_->bends && !roughly && at.last_m < kNear_m ? at.rounding_m : 0.0;
   // (An object may have moved on from under the tool since the part before.)
   const bool pressed = (at.k > 0 || state_->bodies.something_approaches()) && state_->candidates.pressed.count > 0;
   Twist delta;
-  const bool solved = local_.solve(q, e, q_old, rough, still_m, delta);
+  const bool solved = local_step_.solve(q, e, q_old, rough, still_m, delta);
   const bool free = state_->local.count == 0;
   attempt_->lost_contact = attempt_->lost_contact || (pressed && free);
   feet.over = beside_m;
@@ -95,11 +95,11 @@ Iteration::Next Iteration::leave(const ToolPose& p_hat, Progress& at, ToolPose& 
   return Next::iterate;
 }
 
-Iteration::Next Iteration::go_on(const Twist& e, const Twist& delta_of_solution, bool solved, bool roughly,
-                                 Progress& at, ToolPose& q) noexcept {
-  Twist delta = delta_of_solution;
+Iteration::Next Iteration::go_on(const Twist& e, const Twist& solution, bool solved, bool roughly, Progress& at,
+                                 ToolPose& q) noexcept {
+  Twist delta = solution;
   const double size = state_->bodies.size_m(delta);
-  if (solved) local_.balance(e, delta);
+  if (solved) local_step_.balance(e, delta);
   if (at.k >= (attempt_->bends ? kWhole : kWholeFlat) && std::isfinite(at.last_m)) {
     at.share = damped(at.share, delta, at.last_delta);
   }
@@ -108,14 +108,14 @@ Iteration::Next Iteration::go_on(const Twist& e, const Twist& delta_of_solution,
   q = moved(q, at.share * delta);
   // After this step the last ratio times it is left to go. With bends the step counts as well: its forces are those of
   // the normals before it.
-  const bool on = local_.on_features();
+  const bool on = local_step_.on_features();
   const bool whole = at.share == 1.0 && !roughly && on && (!attempt_->bends || size <= kStill_m);
   const bool small = std::isfinite(at.last_m) && size < 0.1 * at.last_m &&
-                     size / at.last_m * size <= 0.1 * at.rounding_m && local_.stays_balanced(delta, e) &&
-                     local_.normals_turn_by(delta) <= kTurned;
+                     size / at.last_m * size <= 0.1 * at.rounding_m && local_step_.stays_balanced(delta, e) &&
+                     local_step_.normals_turn_by(delta) <= kTurned;
   const bool ends = whole && ((state_->local.kept && size <= kStill_m) || size <= at.rounding_m || small);
   const bool rests = solved && !roughly && on && size < at.rest_m;
-  if ((ends || rests) && local_.bar_what_reaches_beyond(q)) {
+  if ((ends || rests) && local_step_.bar_what_reaches_beyond(q)) {
     at.last_m = std::numeric_limits<double>::infinity();
     attempt_->lost_contact = true;  // the barred pair may have been all that held the tool
     return Next::iterate;
@@ -135,7 +135,7 @@ void Iteration::collect_contacts(const ToolPose& pose) noexcept {
 }
 
 void Iteration::drop_contacts() noexcept {
-  local_.drop_contacts();
+  local_step_.drop_contacts();
   state_->contacts.drop_collected();
 }
 

@@ -9,21 +9,18 @@
 
 #include <limits>
 
-#include "models/rigid/rigid_state.hpp"
+#include "models/rigid/local_step.hpp"
 
 namespace proxarm::models {
 
 class Iteration {
  public:
   Iteration(RigidState& state, Attempt& attempt) noexcept
-      : state_(&state),
-        attempt_(&attempt),
-        local_(state.sides, state.bodies, state.candidates, state.touches, attempt, state.local) {}
+      : state_(&state), attempt_(&attempt), local_step_(state, attempt) {}
 
   // From q on. False: no solution was found, or the budget is used up.
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
 
-  [[nodiscard]] LocalStep& local() noexcept { return local_; }
   void collect_contacts(const ToolPose& pose) noexcept;
   // The contacts of the last solution are dropped: the tool left them.
   void drop_contacts() noexcept;
@@ -41,13 +38,13 @@ class Iteration {
 
   [[nodiscard]] Next iterate(const ToolPose& p_hat, const ToolPose& q_old, Progress& at, ToolPose& q) noexcept;
   [[nodiscard]] Next leave(const ToolPose& p_hat, Progress& at, ToolPose& q) noexcept;
-  [[nodiscard]] Next go_on(const Twist& e, const Twist& delta, bool solved, bool roughly, Progress& at,
+  [[nodiscard]] Next go_on(const Twist& e, const Twist& solution, bool solved, bool roughly, Progress& at,
                            ToolPose& q) noexcept;
   [[nodiscard]] double damped(double share, const Twist& delta, const Twist& last) const noexcept;
 
   RigidState* state_;
   Attempt* attempt_;
-  LocalStep local_;
+  LocalStep local_step_;
 };
 
 }  // namespace proxarm::models

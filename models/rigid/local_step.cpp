@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "models/rigid_gaps/bends.hpp"
+#include "models/rigid_gaps/deeper_touches.hpp"
 #include "models/rigid_gaps/near_sides.hpp"
 
 namespace proxarm::models {
@@ -16,7 +17,7 @@ constexpr double kIdle = 1e-3;
 // Contacts that are passed by less than rounding don't join.
 constexpr double kPassed_m = 1e-16;
 // If more than a few are passed, this many join at a time.
-constexpr std::size_t kAtATime = 5, kFewPassed = 12;
+constexpr std::size_t kAtATime = 4, kFewPassed = 12;
 // If there is no room for all, none that is passed by less than a hundredth of what a gap may be short of counts as
 // missing.
 constexpr double kPassedAmongMany_m = 1e-14;
@@ -66,10 +67,10 @@ void LocalStep::linearise(const Found& found, const ToolPose& pose, const ToolPo
 }
 
 // A face that comes down on a fine mesh passes many of its vertices at once, as a prism of many sides does that stands
-// up on a table, and few of them will hold it: those that it passes by most join first, four at a time. Returns the gap
-// below which contacts join; if few are passed, that is any.
+// up on a table, and few of them will hold it: those that it passes by most join first, kAtATime in a round. Returns
+// the gap below which contacts join; if few are passed, that is any.
 double LocalStep::worst_passed(const Twist& xi, const ToolPose& pose) const noexcept {
-  std::array<double, kAtATime> least;
+  std::array<double, kAtATime + 1> least;
   least.fill(-kPassed_m);
   std::size_t passed = 0;
   for (const Found& found : touches_->all()) {
@@ -98,7 +99,7 @@ bool LocalStep::join(const ToolPose& pose, const ToolPose& q_old, const Twist& d
     if (found.working) continue;
     const bool pressed = pair_of(found).pressed;
     const double gap = gap_after(found, pose, delta);
-    const bool passed = gap < worst && (!some || joined + 1 < kAtATime);
+    const bool passed = gap < worst && (!some || joined < kAtATime);
     if (!passed && !(first && pressed)) continue;
     if (local_->count == ContactProblem::most) {
       attempt_->overflow = attempt_->overflow || gap < -kPassedAmongMany_m;
@@ -106,7 +107,7 @@ bool LocalStep::join(const ToolPose& pose, const ToolPose& q_old, const Twist& d
     }
     if (passed) ++joined;
     found.working = true;
-    local_->found[local_->count] = static_cast<std::uint16_t>(i);
+    local_->touch_of[local_->count] = static_cast<std::uint16_t>(i);
     LinearContact& linear = local_->contacts[local_->count];
     linearise(found, pose, q_old, linear, local_->axes[local_->count]);
     // A contact that pressed is still at its place; otherwise forces that hold each other would follow rounding.
@@ -169,7 +170,7 @@ Twist LocalStep::couple(const ToolPose& pose, const Twist& e) noexcept {
 // Touches are reported where they go with this solution, not where they were linearised.
 void LocalStep::move_touches(const ToolPose& pose, const Twist& delta) noexcept {
   for (std::size_t k = 0; k < local_->count; ++k) {
-    Found& found = touches_->found[local_->found[k]];
+    Found& found = touches_->found[local_->touch_of[k]];
     const Vec3 lever = found.touch.point - pose.position;
     Vec3 along = Vec3::Zero();
     if (is_along_side(pair_of(found).kind) && presses(k)) {
@@ -216,7 +217,7 @@ bool LocalStep::solve_fewer(const ToolPose& pose, const Twist& e, double rough, 
     if (!(local_->contacts[k].f[0] > kIdle * most)) continue;
     std::swap(local_->contacts[k], local_->contacts[bearing]);
     std::swap(local_->axes[k], local_->axes[bearing]);
-    std::swap(local_->found[k], local_->found[bearing]);
+    std::swap(local_->touch_of[k], local_->touch_of[bearing]);
     ++bearing;
   }
   if (bearing == 0 || bearing == local_->count || --attempt_->retries_left < 0) return false;
@@ -284,7 +285,7 @@ double LocalStep::normals_turn_by(const Twist& delta) const noexcept {
   for (std::size_t k = 0; k < local_->count; ++k) {
     if (!presses(k)) continue;
     const Pair& pair = pair_of(found_of(k));
-    if (pair.kind == PairKind::point_face || pair.kind == PairKind::point_field || pair.kind == PairKind::rim_field) {
+    if (pair.kind == PairKind::point_face || is_in_field(pair.kind)) {
       continue;
     }
     turns = true;

@@ -1,49 +1,32 @@
-// The local problem at a pose: the linearised contacts that hold the tool, their solution δ, and whether a step may end
-// on it.
+// Makes and solves the local problem at a pose: the linearised contacts that hold the tool, their solution δ, and
+// whether a step may end on it.
 #pragma once
 
-#include <array>
 #include <span>
 
-#include "models/local_problem/contact_problem.hpp"
+#include "models/rigid/rigid_state.hpp"
 #include "models/rigid_gaps/touch_search.hpp"
 
 namespace proxarm::models {
-
-// A step of the iteration that counts as none, m. With bends the last step turns normals by no more than 1e-10 of a
-// clearance of ten micrometres.
-inline constexpr double kStill_m = 1e-15;
-
-struct LocalProblem {
-  Mat6 K = Mat6::Identity();
-  ContactProblem problem;
-  std::array<LinearContact, ContactProblem::most> contacts;
-  std::array<std::uint16_t, ContactProblem::most> found{};  // index in Touches, of each contact
-  std::array<Mat3, ContactProblem::most> axes;              // normal and two tangents, columns, of each contact
-  std::size_t count = 0;
-  bool lies_along = false;  // straight features, one of them round, pressed along each other in the last solution
-  bool kept = false;        // the last solution has the forces of the one before
-};
 
 class LocalStep {
  public:
   // How many contacts may be looked at in the local problems of a step, some 0.2 µs each.
   static constexpr int kWork = 1200;
 
-  LocalStep(const Sides& sides, RigidBodies& bodies, Candidates& candidates, Touches& touches, Attempt& attempt,
-            LocalProblem& local) noexcept
-      : bodies_(&bodies),
-        candidates_(&candidates),
-        touches_(&touches),
+  LocalStep(RigidState& state, Attempt& attempt) noexcept
+      : bodies_(&state.bodies),
+        candidates_(&state.candidates),
+        touches_(&state.touches),
         attempt_(&attempt),
-        local_(&local),
-        search_(bodies, candidates, sides, attempt, touches) {}
+        local_(&state.local),
+        search_(state.bodies, state.candidates, state.sides, attempt, state.touches) {}
 
   void find(const ToolPose& pose, double within_m = Touches::everywhere_m) noexcept { search_.find(pose, within_m); }
 
-  // Solves the local problem at a pose that is e off p̂: δ is the next step of the iteration. `rough`: share of the
-  // exact tolerance that is enough; `still_m`: rounding, if the last solution may hold already, else 0. False: no
-  // solution was found.
+  // Solves the local problem at a pose that is e off p̂: δ is the next step of the iteration. `rough`: as
+  // in ContactProblem::solve(), 0 is exact; `still_m`: rounding, if the last solution may hold already, else 0. False:
+  // no solution was found.
   bool solve(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, double still_m,
              Twist& delta) noexcept;
   // Corrects δ so that the wrenches balance after each force is put into its cone.
@@ -64,7 +47,7 @@ class LocalStep {
  private:
   [[nodiscard]] const Pair& pair_of(const Found& found) const noexcept { return candidates_->pairs[found.pair]; }
   [[nodiscard]] const Found& found_of(std::size_t contact) const noexcept {
-    return touches_->found[local_->found[contact]];
+    return touches_->found[local_->touch_of[contact]];
   }
   [[nodiscard]] std::span<LinearContact> contacts() noexcept {
     return std::span(local_->contacts).first(local_->count);
@@ -90,8 +73,5 @@ class LocalStep {
   LocalProblem* local_;
   TouchSearch search_;
 };
-
-// A force in axes of normal and tangents, N, put into the Coulomb cone.
-[[nodiscard]] Vec3 in_cone(Vec3 f, double mu) noexcept;
 
 }  // namespace proxarm::models

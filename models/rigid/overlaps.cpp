@@ -13,8 +13,6 @@
 namespace proxarm::models {
 namespace {
 
-constexpr std::size_t kMostPlanes = 8;  // more contacts than hold a tool
-
 // Nothing for an open mesh, which has no inside.
 std::optional<bool> should_be_inside(const RigidEntry& mesh) noexcept {
   return mesh.held != 0.0 ? std::optional<bool>(mesh.object.inside_out) : std::nullopt;
@@ -29,7 +27,7 @@ double overlap_of(const RigidPart& part, const RigidEntry& entry, const View& at
   }
   const Solid& solid = *entry.solid();
   if (part.mesh) {
-    std::array<Vec3, kMostPlanes> normals;
+    std::array<Vec3, Overlaps::most_planes> normals;
     const std::size_t count = std::min(apart.normals.size(), normals.size());
     for (std::size_t i = 0; i < count; ++i) normals[i] = -(at.R.transpose() * apart.normals[i]);
     return overlap_with_mesh(solid, entry.box, part.mesh->mesh(), inverse(at), false,

@@ -11,6 +11,8 @@ namespace proxarm::models {
 
 class Overlaps {
  public:
+  static constexpr std::size_t most_planes = 8;  // to try first: more contacts than hold a tool
+
   Overlaps(const RigidBodies& bodies, const Candidates& candidates, LastPlanes& last_planes) noexcept
       : bodies_(&bodies), candidates_(&candidates), last_planes_(&last_planes) {}
 

@@ -4,9 +4,12 @@
 #include <memory>
 #include <utility>
 
-#include "models/rigid/local_step.hpp"
+#include "models/rigid/linear_problem.hpp"
 #include "models/rigid/step_contacts.hpp"
+#include "models/rigid_bodies/sides.hpp"
 #include "models/rigid_features/mesh_overlap.hpp"
+#include "models/rigid_gaps/touches.hpp"
+#include "models/rigid_pairs/candidates.hpp"
 
 namespace proxarm::models {
 
@@ -18,6 +21,8 @@ struct RigidState {
   }
 
   void gather(const ToolPose& pose, double reach_m) noexcept;
+  // The same, only if the tool at a pose has left half of what was gathered. Whether it had.
+  bool gather_if_far(const ToolPose& pose) noexcept;
   void take_sides(const ToolPose& pose, double far_m) noexcept { sides.take(bodies, candidates.all(), pose, far_m); }
 
   RigidBodies bodies;
@@ -27,12 +32,9 @@ struct RigidState {
   LocalProblem local;
   StepContacts contacts;
   LastPlanes last_planes;
-  ToolPose q;                 // where the last step ended
-  double clearance_m = -1.0;  // nothing is nearer than this around the pose of the last gathering; −1: not known
+  ToolPose q;                    // where the last step ended
+  double empty_around_m = -1.0;  // nothing is nearer than this around the pose of the last gathering; −1: not known
   bool unresolved = false, squeezed = false;
 };
-
-// The smallest signed gap between the tool and all objects that are close, at a pose, m. Changes the state.
-[[nodiscard]] double least_gap_m(RigidState& state, const ToolPose& pose) noexcept;
 
 }  // namespace proxarm::models

@@ -18,64 +18,68 @@ constexpr int kRetries = 6;
 
 }  // namespace
 
-void RigidStep::take(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept {
+void RigidStep::take(const Mat6& K, const ToolPose& p_hat, ToolPose q_old) noexcept {
   RigidBodies& bodies = state_->bodies;
   state_->contacts.clear();
   state_->unresolved = state_->squeezed = false;
-  if (bodies.motion_m(q, state_->q) > kFront_m) state_->candidates.forget();
-  const double far_m = bodies.moving().empty() ? bodies.motion_m(p_hat, q) : bodies.find_approaching(p_hat, q);
-  if (is_free(q, far_m)) {
+  if (bodies.motion_m(q_old, state_->q) > kFront_m) state_->candidates.forget();
+  const double far_m = bodies.moving().empty() ? bodies.motion_m(p_hat, q_old) : bodies.begin_step(p_hat, q_old);
+  if (passes_freely(q_old, far_m)) {
     state_->q = p_hat;
     return;
   }
   state_->local.K = K;
   state_->local.problem.set_stiffness(K);
-  const Plan plan = this->plan(p_hat, q, far_m);
-  const Way way{plan.goal, q, plan.far_m, plan.parts};
+  const Plan planned = plan(p_hat, q_old, far_m);
+  allow(planned);
+  const Way way{planned.goal, q_old, planned.far_m, planned.parts};
   const bool lawful = take_lawfully(way);
   if (!lawful) take_without_friction(way);
-  state_->unresolved = !lawful || !plan.whole || attempt_.overflow || state_->candidates.crowded;
+  state_->unresolved = !lawful || !planned.whole || attempt_.overflow || state_->candidates.crowded;
   state_->squeezed = attempt_.squeezed;
   if (!state_->contacts.collected()) iteration_.collect_contacts(state_->q);
-  state_->contacts.judge_slips(bodies, q, state_->q);
+  state_->contacts.judge_slips(bodies, q_old, state_->q);
 }
 
 // Whether nothing comes near in this step. Gathers the pairs anew if the tool has come too far for them.
-bool RigidStep::is_free(const ToolPose& q, double far_m) noexcept {
+bool RigidStep::passes_freely(const ToolPose& q_old, double far_m) noexcept {
   const Candidates& candidates = state_->candidates;
-  double came = candidates.came_m(state_->bodies, q);
-  if (state_->clearance_m > 0.0 && came + far_m < state_->clearance_m) return true;
+  double came = candidates.came_m(state_->bodies, q_old);
+  if (state_->empty_around_m > 0.0 && came + far_m < state_->empty_around_m) return true;
   if (candidates.crowded || !(came + 2.0 * far_m < candidates.gathered_reach_m)) {
-    Gathering(state_->bodies, state_->candidates).gather_for(q, far_m);
-    came = candidates.came_m(state_->bodies, q);
+    Gathering(state_->bodies, state_->candidates).gather_for(q_old, far_m);
+    came = candidates.came_m(state_->bodies, q_old);
   }
-  state_->clearance_m = -1.0;
+  state_->empty_around_m = -1.0;
   // (If much was near, pairs may be gathered less far around than the step's way.)
   if (candidates.count != 0 || !(came + far_m < candidates.gathered_reach_m)) return false;
-  state_->clearance_m = candidates.gathered_reach_m;
+  state_->empty_around_m = candidates.gathered_reach_m;
   return true;
 }
 
-RigidStep::Plan RigidStep::plan(const ToolPose& p_hat, const ToolPose& q, double far_m) noexcept {
+RigidStep::Plan RigidStep::plan(const ToolPose& p_hat, const ToolPose& q_old, double far_m) const noexcept {
   const RigidBodies& bodies = state_->bodies;
   const double reach = state_->candidates.gathered_reach_m;
   // If all that the step can come near is known, one part may go as far.
-  const bool all_known = !bodies.setup().dense && state_->candidates.came_m(bodies, q) + 2.0 * far_m < reach;
+  const bool all_known = !bodies.setup().dense && state_->candidates.came_m(bodies, q_old) + 2.0 * far_m < reach;
   const double limit = std::min(kPart * bodies.setup().thinness_m, all_known ? reach : 0.25 * reach);
   const double wanted = std::max(std::ceil(far_m / limit), 1.0);
   Plan plan{.goal = p_hat, .far_m = far_m};
   plan.whole = wanted <= (bodies.something_approaches() ? kMostPartsOfMoving : kMostParts);
   plan.parts = plan.whole ? static_cast<int>(wanted) : kMostParts;
   if (!plan.whole) {
-    plan.goal = moved(q, difference(p_hat, q) * (kMostParts / wanted));
+    plan.goal = moved(q_old, difference(p_hat, q_old) * (kMostParts / wanted));
     // With the goal the way gets shorter only if nothing moves.
-    if (bodies.moving().empty()) plan.far_m = bodies.motion_m(plan.goal, q);
+    if (bodies.moving().empty()) plan.far_m = bodies.motion_m(plan.goal, q_old);
   }
-  attempt_.poses_left = kBudget + kPosesOfPart * plan.parts;
+  return plan;
+}
+
+void RigidStep::allow(const Plan& plan) noexcept {
+  attempt_.poses_left = kPosesOfStep + kPosesOfPart * plan.parts;
   attempt_.looks_left = kLooks;
   attempt_.retries_left = kRetries;
   allow_for(plan.parts, *state_);
-  return plan;
 }
 
 // A step that has used up its looks finds no more in smaller parts, nor without friction.
@@ -86,10 +90,10 @@ bool RigidStep::may_look_on() const noexcept {
 // False: no forces were found that keep all laws.
 bool RigidStep::take_lawfully(const Way& way) noexcept {
   ToolPose& q = state_->q;
-  const bool led = in_parts_.take(way, q) && !fallback_.went_in(way.q_old, q);
+  const bool led = in_parts_.take_outside(way, q);
   if (led && in_parts_.gives_energy(q, way.q_old)) return !may_look_on() || in_parts_.take_closely(way, q);
-  if (led || attempt_.poses_left <= 0 || in_parts_.finer(way.parts) <= 1 || !may_look_on()) return led;
-  return in_parts_.take_smaller(way, q) && !fallback_.went_in(way.q_old, q);
+  if (led || attempt_.poses_left <= 0 || in_parts_.parts_of_part(way.parts) <= 1 || !may_look_on()) return led;
+  return in_parts_.take_smaller(way, q);
 }
 
 // A tool that stayed where it is would meet the same problem in the next step, so friction is left out of this one. In
@@ -99,7 +103,7 @@ void RigidStep::take_without_friction(const Way& way) noexcept {
   const RigidBodies& bodies = state_->bodies;
   bool led = false;
   if (!bodies.setup().hollow && may_look_on()) {
-    attempt_.poses_left = kBudget;
+    attempt_.poses_left = kPosesOfStep;
     attempt_.looks_left = bodies.something_approaches() ? std::min(attempt_.looks_left, kLooks / 2) : kLooks / 2;
     state_->local.problem.allow(LocalStep::kWork);
     attempt_.without_friction = true;
@@ -113,7 +117,7 @@ void RigidStep::take_without_friction(const Way& way) noexcept {
       attempt_.squeezed = squeezed;
     }
   }
-  if (!led) fallback_.went_in(way.q_old, state_->q);
+  if (!led) fallback_.take_back_if_in(way.q_old, state_->q);
 }
 
 }  // namespace proxarm::models

@@ -11,11 +11,14 @@ class RigidStep {
   explicit RigidStep(RigidState& state) noexcept
       : state_(&state),
         iteration_(state, attempt_),
-        fallback_(state, attempt_, iteration_),
+        fallback_(state, attempt_),
         in_parts_(state, attempt_, iteration_, fallback_) {}
 
-  // Writes state.q, the contacts and the flags of the step.
-  void take(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept;
+  RigidStep(const RigidStep&) = delete;  // its members refer to each other
+  RigidStep& operator=(const RigidStep&) = delete;
+
+  // Writes state.q, the contacts and the flags of the step from q_old.
+  void take(const Mat6& K, const ToolPose& p_hat, ToolPose q_old) noexcept;
 
  private:
   // The part of the way to p̂ that the step takes, in parts. `whole`: all of it.
@@ -26,8 +29,9 @@ class RigidStep {
     bool whole = true;
   };
 
-  [[nodiscard]] bool is_free(const ToolPose& q, double far_m) noexcept;
-  [[nodiscard]] Plan plan(const ToolPose& p_hat, const ToolPose& q, double far_m) noexcept;
+  [[nodiscard]] bool passes_freely(const ToolPose& q_old, double far_m) noexcept;
+  [[nodiscard]] Plan plan(const ToolPose& p_hat, const ToolPose& q_old, double far_m) const noexcept;
+  void allow(const Plan& plan) noexcept;
   bool take_lawfully(const Way& way) noexcept;
   void take_without_friction(const Way& way) noexcept;
   [[nodiscard]] bool may_look_on() const noexcept;

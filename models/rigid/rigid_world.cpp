@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "models/rigid/clearance.hpp"
 #include "models/rigid/rigid_step.hpp"
 
 namespace proxarm::models {
@@ -53,7 +54,7 @@ double RigidWorld::clearance_m(const ToolPose& pose) const noexcept {
 
 double RigidWorld::clearance_at_m(const ToolPose& pose, double time_s) const noexcept {
   RigidState copy(*state_);
-  copy.bodies.take_time_s(time_s);
+  copy.bodies.go_to_time(time_s);
   return least_gap_m(copy, pose);
 }
 

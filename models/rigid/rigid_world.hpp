@@ -28,18 +28,18 @@ namespace proxarm::models {
 
 struct RigidState;
 
-// Friction between a part with a friction of its own and an object: √(μ_tool μ_object); else the object's.
 class RigidWorld final : public PoseAlgorithm {
  public:
   // Throws std::invalid_argument for a tool without parts (a point is rendered by a World), a tool's shape without a
-  // size, points that span no solid, a mesh that is open, a friction below 0, a cylinder as an object, and one as a
-  // tool beside solids, meshes or a tube with round ends. An open mesh as an object, which compile_rigid() refuses, is
-  // held from both sides, but sharp features may pass its border by micrometres.
+  // size, points that span no solid, an open mesh as a part of the tool, a friction below 0, a hull of more than
+  // 2000 points, and a cylinder as a tool beside an open mesh or a tube with round ends. An open mesh as an object,
+  // which compile_rigid() refuses, is held from both sides, but sharp features may pass its border by micrometres.
   RigidWorld(const Tool& tool, std::vector<RigidObject> objects);
 
   const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;
   void set_time(const StepTime& time) noexcept override;
   [[nodiscard]] bool wants_time() const noexcept override;
+  // Between the object and a part of the tool with a friction of its own, √(μ_tool μ_object) holds.
   void set_friction(std::int32_t object, double friction) noexcept override;
   void drive(std::int32_t object, const Pose& X) noexcept override;
 

@@ -1,7 +1,6 @@
 #include "models/rigid/step_contacts.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "models/rigid_gaps/bends.hpp"
 
@@ -19,14 +18,12 @@ void StepContacts::collect(const RigidBodies& bodies, const Candidates& candidat
   collected_ = true;
   with_moving_ = false;
   for (std::size_t k = 0; k < local.count; ++k) {
-    const Found& found = touches.found[local.found[k]];
+    const Found& found = touches.found[local.touch_of[k]];
     const Pair& pair = candidates.pairs[found.pair];
     const LinearContact& linear = local.contacts[k];
     if (linear.state == ContactState::open && found.touch.gap > kGap_m) continue;
     const double sine = sine_of_rims(bodies, pair, found.touch, pose);
-    entry_[count_] = pair.entry;
-    turns_[count_] = 1.0 / sine;
-    bend_[count_] = curvature_per_m(bodies, pair) / (sine * sine);
+    more_[count_] = {curvature_per_m(bodies, pair) / (sine * sine), 1.0 / sine, pair.entry};
     with_moving_ = with_moving_ || bodies.moves_now(pair.entry);
     PoseContact& contact = contacts_[count_++];
     contact.object = bodies.entry(pair).object.object;
@@ -55,22 +52,22 @@ bool StepContacts::give_energy(RigidBodies& bodies, const ToolPose& pose, const 
     const PoseContact& contact = contacts_[k];
     const double force = contact.force_W.norm();
     if (force == 0.0) continue;
-    const std::uint16_t entry = entry_[k];
+    const std::uint16_t entry = more_[k].entry;
     const bool moves = bodies.moves_now(entry);
     const Vec3 way = moves ? bodies.slip_m(entry, contact.point_W - pose.position)
                            : Vec3(contact.point_W - old * now.to_T(contact.point_W));
     const double s = way.norm(), lever = (contact.point_W - pose.position).norm();
     const double turned = moves ? bodies.moving(entry).turned.norm() : turned_W;
     work += contact.force_W.dot(way);
-    bends += force * (turned * (0.5 * turned * lever + turns_[k] * s) + 0.5 * bend_[k] * s * s + rounding);
+    bends += force *
+             (turned * (0.5 * turned * lever + more_[k].turns * s) + 0.5 * more_[k].curvature_per_m * s * s + rounding);
   }
   return work > bends + kNothing_J;
 }
 
 void StepContacts::judge_slips(RigidBodies& bodies, const ToolPose& q_old, ToolPose& q) noexcept {
   if (count_ == 0) return;
-  const double rounding = 8.0 * std::numeric_limits<double>::epsilon() *
-                          (q_old.position.lpNorm<1>() + bodies.setup().reach_m + bodies.extent_m());
+  const double rounding = 2.0 * bodies.rounding_m(q_old);
   if (!with_moving_) {
     if (bodies.motion_m(q, q_old) > rounding) return;
     q = q_old;
@@ -81,7 +78,7 @@ void StepContacts::judge_slips(RigidBodies& bodies, const ToolPose& q_old, ToolP
   bodies.measure_slip(q, q_old);
   for (std::size_t k = 0; k < count_; ++k) {
     PoseContact& contact = contacts_[k];
-    const Vec3 slip = bodies.slip_since_m(q_old, entry_[k], contact.point_W, q);
+    const Vec3 slip = bodies.slip_since_m(q_old, more_[k].entry, contact.point_W, q);
     contact.slips = contact.slips && (slip - contact.normal_W * contact.normal_W.dot(slip)).norm() > rounding;
   }
 }

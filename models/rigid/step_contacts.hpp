@@ -5,7 +5,9 @@
 #include <span>
 
 #include "models/geometry/pose_algorithm.hpp"
-#include "models/rigid/local_step.hpp"
+#include "models/rigid/linear_problem.hpp"
+#include "models/rigid_gaps/touches.hpp"
+#include "models/rigid_pairs/candidates.hpp"
 
 namespace proxarm::models {
 
@@ -17,7 +19,7 @@ class StepContacts {
   // Takes the contacts of the local problem at a pose.
   void collect(const RigidBodies& bodies, const Candidates& candidates, const Touches& touches,
                const LocalProblem& local, const ToolPose& pose) noexcept;
-  // Whether the contacts are those of the pose that the step ends on, kept from an earlier iterate.
+  // Whether all() belongs to the pose that the step reached; otherwise collect() is due.
   [[nodiscard]] bool collected() const noexcept { return collected_; }
   void drop_collected() noexcept { collected_ = false; }
 
@@ -28,10 +30,14 @@ class StepContacts {
   void judge_slips(RigidBodies& bodies, const ToolPose& q_old, ToolPose& q) noexcept;
 
  private:
+  // What else is known about a contact.
+  struct More {
+    double curvature_per_m = 0.0;  // of the two bodies
+    double turns = 1.0;            // the normal turns by up to this many times the tool's rotation
+    std::uint16_t entry = 0;
+  };
   std::array<PoseContact, ContactProblem::most> contacts_;
-  // Of each contact: the bodies' curvature (1/m), by how many times more than the tool its normal may turn, its entry.
-  std::array<double, ContactProblem::most> bend_, turns_;
-  std::array<std::uint16_t, ContactProblem::most> entry_{};
+  std::array<More, ContactProblem::most> more_;
   std::size_t count_ = 0;
   bool collected_ = false;
   bool with_moving_ = false;  // a contact is with an object that moves

@@ -22,7 +22,7 @@ constexpr int kOfPose = 150;
 
 bool StepInBatches::take() noexcept {
   state_->bodies.move_to(0.0);
-  state_->gather(way_.q_old, kGatheredParts * way_.each_m);
+  state_->gather(way_.q_old, kGatheredParts * each_m_);
   begin_batch();
   state_->touches.count = 0;
   Next next = Next::on;
@@ -44,17 +44,10 @@ bool StepInBatches::take() noexcept {
 
 // The pairs are those that are near where the tool is, the sides those on which it is.
 void StepInBatches::begin_batch() noexcept {
-  Candidates& candidates = state_->candidates;
-  if (candidates.came_m(state_->bodies, reached_) > 0.5 * candidates.gathered_reach_m) {
-    state_->gather(reached_, candidates.gathered_reach_m);
-    attempt_->looks_left -= kOfPose + 4 * static_cast<int>(candidates.near_faces);
+  if (state_->gather_if_far(reached_)) {
+    attempt_->looks_left -= kOfPose + 4 * static_cast<int>(state_->candidates.triangles_near);
   }
-  state_->take_sides(reached_, way_.each_m);
-}
-
-// p̂ at the end of a part.
-ToolPose StepInBatches::goal_of(int part) const noexcept {
-  return part == way_.parts ? way_.p_hat : state_->bodies.goal_at(way_.p_hat, way_.q_old, share(part));
+  state_->take_sides(reached_, each_m_);
 }
 
 // As many parts as there is room for. Whether there were any.
@@ -62,18 +55,18 @@ bool StepInBatches::go_freely() noexcept {
   const RigidBodies& bodies = state_->bodies;
   const Candidates& candidates = state_->candidates;
   // The tool may be off its way, where something held it before.
-  const double off = k_ == 0 ? 0.0 : bodies.motion_m(goal_of(k_), reached_);
+  const double off = k_ == 0 ? 0.0 : bodies.motion_m(way_.goal(state_->bodies, k_), reached_);
   const int left = way_.parts - k_;
-  const double enough = (off + way_.each_m * left) / kOfRoom;
+  const double enough = (off + each_m_ * left) / kOfRoom;
   // If no pair was gathered, nothing is nearer than pairs are gathered.
   const bool nothing_near = candidates.count == 0;
   double room = nothing_near ? candidates.gathered_reach_m - candidates.came_m(bodies, reached_) : 0.0;
   if (room < enough) room = std::max(room, free_room_m(*state_, reached_, enough, attempt_->looks_left));
-  const double free = std::floor(std::min((kOfRoom * room - off) / way_.each_m + 1e-9, static_cast<double>(left)));
+  const double free = std::floor(std::min((kOfRoom * room - off) / each_m_ + 1e-9, static_cast<double>(left)));
   if (free < (nothing_near ? 1.0 : 2.0) && !(free >= 0.0 && static_cast<int>(free) == left)) return false;
   k_ += static_cast<int>(free);
-  state_->bodies.move_to(share(k_));
-  reached_ = goal_of(k_);
+  state_->bodies.move_to(way_.share(k_));
+  reached_ = way_.goal(state_->bodies, k_);
   iteration_->drop_contacts();
   batch_ = 1;
   return true;
@@ -82,9 +75,9 @@ bool StepInBatches::go_freely() noexcept {
 // A batch in which something holds the tool, or may.
 StepInBatches::Next StepInBatches::go_held() noexcept {
   const int to = std::min(k_ + batch_, way_.parts);
-  const ToolPose start = state_->bodies.carry_to(reached_, share(to));
-  ToolPose p = goal_of(to);
-  const double ahead = state_->bodies.motion_m(p, start), most = 2.0 * way_.each_m * batch_;
+  const ToolPose start = state_->bodies.carry_to(reached_, way_.share(to));
+  ToolPose p = way_.goal(state_->bodies, to);
+  const double ahead = state_->bodies.motion_m(p, start), most = 2.0 * each_m_ * batch_;
   const bool last = to == way_.parts && ahead <= most;
   if (ahead > most) p = moved(start, difference(p, start) * (most / ahead));
   allow_part(last, *state_, *attempt_);
@@ -93,19 +86,19 @@ StepInBatches::Next StepInBatches::go_held() noexcept {
   const bool solved = iteration_->settle(p, way_.q_old, next);
   attempt_->looks_left -= kOfPose * (before - attempt_->poses_left);
   const double came = state_->sides.came_m(state_->bodies, next);
-  if (batch_ > 1 && !(solved && came <= way_.each_m)) {  // too far at once
+  if (batch_ > 1 && !(solved && came <= each_m_)) {  // too far at once
     attempt_->overflow = false;
     batch_ = std::max(batch_ / (kLonger * kLonger), 1);
-    state_->bodies.move_to(share(k_));
+    state_->bodies.move_to(way_.share(k_));
     return Next::again;
   }
   reached_ = solved ? next : start;
   if (solved) {
     // As many parts at once as the tool needs to come as far as it may in one.
-    const double longer = std::min(kOfRoom * way_.each_m / came, double{kLonger}) * batch_;
+    const double longer = std::min(kOfRoom * each_m_ / came, double{kLonger}) * batch_;
     batch_ = static_cast<int>(std::clamp(longer, 1.0, static_cast<double>(way_.parts)));
   } else {
-    // Only the last part's forces are asked for. Before it, any pose will do that leads through nothing.
+    // As in StepInParts: before the last part any pose will do that leads through nothing.
     attempt_->overflow = false;
     if (!fallback_->step_aside(reached_) || to == way_.parts) return Next::nowhere;
   }
@@ -126,7 +119,7 @@ void StepInBatches::wait_for_objects() noexcept {
   for (const MovingEntry& m : std::as_const(bodies).moving()) {
     if (m.close) most = std::max(most, m.mover.way_m(reached_.position, bodies.setup().reach_m));
   }
-  const double done = share(k_), rest = (1.0 - done) * most / way_.each_m;
+  const double done = way_.share(k_), rest = (1.0 - done) * most / each_m_;
   const int parts = static_cast<int>(std::clamp(std::ceil(rest), 1.0, 8.0 * kMostParts));
   for (int k = 1; k <= parts; ++k) {
     bodies.move_to(done + (1.0 - done) * k / parts);

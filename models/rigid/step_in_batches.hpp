@@ -7,17 +7,13 @@
 #pragma once
 
 #include "models/rigid/fallback.hpp"
+#include "models/rigid/iteration.hpp"
+#include "models/rigid/way.hpp"
 
 namespace proxarm::models {
 
 class StepInBatches {
  public:
-  struct Way {
-    const ToolPose &p_hat, &q_old;
-    double each_m;  // how far p̂ goes in a part
-    int parts;
-  };
-
   StepInBatches(RigidState& state, Attempt& attempt, Iteration& iteration, Fallback& fallback, const Way& way) noexcept
       : state_(&state), attempt_(&attempt), iteration_(&iteration), fallback_(&fallback), way_(way) {}
 
@@ -28,8 +24,6 @@ class StepInBatches {
  private:
   enum class Next { on, again, nowhere, end };
 
-  [[nodiscard]] double share(int part) const noexcept { return static_cast<double>(part) / way_.parts; }
-  [[nodiscard]] ToolPose goal_of(int part) const noexcept;
   void begin_batch() noexcept;
   bool go_freely() noexcept;
   [[nodiscard]] Next go_held() noexcept;
@@ -40,6 +34,7 @@ class StepInBatches {
   Iteration* iteration_;
   Fallback* fallback_;
   Way way_;
+  double each_m_ = way_.each_m();
   int k_ = 0, batch_ = 1;  // parts that are done, and parts of the next batch
   ToolPose reached_ = way_.q_old;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "models/rigid/budget.hpp"
+#include "models/rigid/step_in_batches.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -17,38 +18,36 @@ constexpr int kFiner = 8;
 
 bool StepInParts::take(const Way& way, ToolPose& q) noexcept {
   attempt_->lost_contact = attempt_->overflow = attempt_->squeezed = false;
-  const double each = way.far_m / way.parts;
   if (state_->bodies.something_approaches() && way.parts > 1) {
-    StepInBatches batches(*state_, *attempt_, *iteration_, *fallback_, {way.p_hat, way.q_old, each, way.parts});
+    StepInBatches batches(*state_, *attempt_, *iteration_, *fallback_, way);
     const bool led = batches.take();
     q = batches.reached();
     return led;
   }
   state_->bodies.move_to(0.0);
   q = way.q_old;
-  return take_parts(way, each, {1, way.parts}, q);
+  return take_parts(way, way.each_m(), {1, way.parts}, q);
 }
 
-// From q, some of the parts, in each of which no point goes further than `each`.
-bool StepInParts::take_parts(const Way& way, double each, const Range& range, ToolPose& q) noexcept {
+// From q, some of the parts, in each of which no point goes further than `each_m`.
+bool StepInParts::take_parts(const Way& way, double each_m, const Range& range, ToolPose& q) noexcept {
   const bool approaches = state_->bodies.something_approaches();
   int left_out = 0;  // parts just before this one
-  state_->take_sides(q, each);
+  state_->take_sides(q, each_m);
   for (int k = range.first; k <= range.last; ++k) {
     if (state_->candidates.crowded) return false;  // a pair that isn't known may be in the way
-    const double share = static_cast<double>(k) / way.parts;
-    q = state_->bodies.carry_to(q, share);
-    const ToolPose p = k == way.parts ? way.p_hat : state_->bodies.goal_at(way.p_hat, way.q_old, share), from = q;
+    q = state_->bodies.carry_to(q, way.share(k));
+    const ToolPose p = way.goal(state_->bodies, k), from = q;
     if (approaches || (k == way.parts && way.parts > 1)) allow_part(k == way.parts, *state_, *attempt_);
     ToolPose next = approaches ? fallback_->along_with_holder(q) : q;
     if (iteration_->settle(p, way.q_old, next)) {
       left_out = 0;
-      const bool past_sides = state_->bodies.motion_m(next, q) > 2.0 * each;
+      const bool past_sides = state_->bodies.motion_m(next, q) > 2.0 * each_m;
       attempt_->lost_contact = attempt_->lost_contact || past_sides;
       q = next;
       if (attempt_->refines && gives_energy(q, from)) {
         q = from;
-        if (!take_part_closely(way, each, k, q)) return false;
+        if (!take_part_closely(way, each_m, k, q)) return false;
       }
     } else {
       // Only the last part's forces are asked for. Before it, any pose will do that leads through nothing.
@@ -57,36 +56,39 @@ bool StepInParts::take_parts(const Way& way, double each, const Range& range, To
       if (!may || !fallback_->step_aside(q) || k == range.last) return false;
     }
     if (k < way.parts) {
-      const double reach = state_->candidates.gathered_reach_m;
-      if (state_->candidates.came_m(state_->bodies, q) > 0.5 * reach) state_->gather(q, reach);
-      state_->take_sides(q, each);
+      state_->gather_if_far(q);
+      state_->take_sides(q, each_m);
     }
   }
   return true;
 }
 
 // One part, in smaller ones.
-bool StepInParts::take_part_closely(const Way& way, double each, int part, ToolPose& q) noexcept {
+bool StepInParts::take_part_closely(const Way& way, double each_m, int part, ToolPose& q) noexcept {
   attempt_->refines = false;
   attempt_->poses_left += kPosesOfPart * kFiner;
   allow_for(2 * kFiner, *state_);
   const Way finer_way{way.p_hat, way.q_old, way.far_m, kFiner * way.parts};
-  const bool led = take_parts(finer_way, each / kFiner, {(part - 1) * kFiner + 1, part * kFiner}, q);
+  const bool led = take_parts(finer_way, each_m / kFiner, {(part - 1) * kFiner + 1, part * kFiner}, q);
   attempt_->refines = true;
   return led;
 }
 
-int StepInParts::finer(int parts) const noexcept {
+int StepInParts::parts_of_part(int parts) const noexcept {
   return state_->bodies.something_approaches() ? std::clamp(kMostParts / 2 / parts, 1, kFiner) : kFiner;
 }
 
+bool StepInParts::take_outside(const Way& way, ToolPose& q) noexcept {
+  return take(way, q) && !fallback_->take_back_if_in(way.q_old, q);
+}
+
 bool StepInParts::take_smaller(Way way, ToolPose& q) noexcept {
-  way.parts *= finer(way.parts);
+  way.parts *= parts_of_part(way.parts);
   attempt_->poses_left += kPosesOfPart * way.parts;
   allow_for(2 * way.parts, *state_);  // (of 192 parts along a corner each took 80 contacts)
   state_->bodies.move_to(0.0);
   state_->gather(way.q_old, state_->candidates.gathered_reach_m);
-  return take(way, q);
+  return take_outside(way, q);
 }
 
 // Over an edge a step gives energy in smaller parts, too. But from so far before a wedge that an eighth of the step
@@ -94,15 +96,15 @@ bool StepInParts::take_smaller(Way way, ToolPose& q) noexcept {
 // is divided once more. (Found by the stress study, replay 5459542357847018, step 719.) False: smaller parts lead
 // nowhere or into an object, and the tool stays where they led.
 bool StepInParts::take_closely(const Way& way, ToolPose& q) noexcept {
-  if (finer(way.parts) == 1) return true;
+  if (parts_of_part(way.parts) == 1) return true;
   const bool approaches = state_->bodies.something_approaches();
   attempt_->refines = !approaches;
-  const bool led = take_smaller(way, q) && !fallback_->went_in(way.q_old, q);
+  const bool led = take_smaller(way, q);
   attempt_->refines = false;
   Way smaller = way;
   smaller.parts *= kFiner;
-  if (!led || !approaches || finer(smaller.parts) == 1 || !gives_energy(q, way.q_old)) return led;
-  return take_smaller(smaller, q) && !fallback_->went_in(way.q_old, q);
+  if (!led || !approaches || parts_of_part(smaller.parts) == 1 || !gives_energy(q, way.q_old)) return led;
+  return take_smaller(smaller, q);
 }
 
 bool StepInParts::gives_energy(const ToolPose& q, const ToolPose& q_old) noexcept {

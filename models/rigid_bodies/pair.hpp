@@ -35,7 +35,14 @@ enum class PairKind : std::uint8_t {
   rims
 };
 
-// Whether a feature of a cylinder takes part.
+// A flat or hollow object takes part.
+constexpr bool is_in_field(PairKind kind) noexcept {
+  return kind == PairKind::point_field || kind == PairKind::rim_field;
+}
+constexpr bool is_point_and_face(PairKind kind) noexcept {
+  return kind == PairKind::point_face || kind == PairKind::face_point;
+}
+// A cylinder's feature and one of a solid, a mesh or another cylinder. The order of the enumerators counts.
 constexpr bool is_of_cylinder(PairKind kind) noexcept { return kind >= PairKind::side_point; }
 constexpr bool is_of_two_cylinders(PairKind kind) noexcept { return kind >= PairKind::sides; }
 // A rim over a flat surface.
@@ -56,7 +63,8 @@ struct Pair {
   bool pressed = false;  // it had a force in the last local problem
   bool barred = false;   // its normal proved unlawful in this part of the step: the pair isn't judged
   float apart_m = 0.0F;  // lower bound of the distance when the pair was gathered; 0 for pairs with a cylinder
-  Vec3 force_W = Vec3::Zero();            // in the last solution, N
+  // Force at the pair's first place in the last solution, N. Unlike PressedPlaces it is kept when pairs are gathered.
+  Vec3 force_W = Vec3::Zero();
   std::array<double, 2> level{1.0, 0.0};  // lowest direction of a rim, in its u and v, before it lay flat
 };
 

@@ -32,6 +32,11 @@ EdgeLine RigidBodies::other_edge(const Pair& pair) const noexcept {
   return mesh != nullptr ? mesh->edge(pair.other).line : edge_of(*entry(pair).solid(), pair.other);
 }
 
+const Vec3& RigidBodies::other_point(const Pair& pair) const noexcept {
+  const TriangleFeatures* mesh = entry(pair).mesh();
+  return mesh != nullptr ? mesh->vertex(pair.other) : entry(pair).solid()->points[pair.other];
+}
+
 double RigidBodies::friction(const Pair& pair) const noexcept {
   const double mu = friction_[pair.entry];
   const std::optional<double>& own = part(pair).friction;
@@ -76,7 +81,7 @@ void RigidBodies::arrive() noexcept {
   for (MovingEntry& m : moving_) m.mover.arrive();
 }
 
-void RigidBodies::take_time_s(double time_s) noexcept {
+void RigidBodies::go_to_time(double time_s) noexcept {
   for (MovingEntry& m : moving_) {
     m.mover.set_time({.time_s = time_s, .period_s = 0.0});
     m.mover.go(1.0);
@@ -99,7 +104,7 @@ double RigidBodies::room_m(std::uint16_t entry, const ToolPose& pose) const noex
 
 // In an object's frame the tool moves by its own motion and the object's. An object that meets the tool pushes it by no
 // more than its own way, and perhaps into the way of others: so the search is repeated until it finds no more.
-double RigidBodies::find_approaching(const ToolPose& p_hat, const ToolPose& q) noexcept {
+double RigidBodies::begin_step(const ToolPose& p_hat, const ToolPose& q) noexcept {
   move_to(0.0);
   const double far = motion_m(p_hat, q);
   double most = 0.0;
@@ -119,22 +124,22 @@ double RigidBodies::find_approaching(const ToolPose& p_hat, const ToolPose& q) n
     }
   }
   carrier_ = only_one_near(q, 2.0 * (far + most) + kFront_m);
-  if (carrier_ == nobody) return far + most;
-  const RigidMover& mover = moving_[carrier_].mover;
+  if (!carrier_) return far + most;
+  const RigidMover& mover = moving_[*carrier_].mover;
   return motion_m(mover.is().back(p_hat), mover.at().back(q));
 }
 
 // The moving object that is all that is near.
-std::size_t RigidBodies::only_one_near(const ToolPose& q, double near) const noexcept {
-  std::size_t found = nobody;
+std::optional<std::size_t> RigidBodies::only_one_near(const ToolPose& q, double near) const noexcept {
+  std::optional<std::size_t> found;
   for (std::size_t i = 0; i < moving_.size(); ++i) {
     if (!moving_[i].close) continue;
-    if (found != nobody || moving_[i].mover.rests()) return nobody;
+    if (found || moving_[i].mover.rests()) return {};
     found = i;
   }
-  if (found == nobody) return nobody;
+  if (!found) return {};
   for (std::size_t entry = 0; entry < setup_->first_moving; ++entry) {
-    if (room_m(static_cast<std::uint16_t>(entry), q) <= near) return nobody;
+    if (room_m(static_cast<std::uint16_t>(entry), q) <= near) return {};
   }
   return found;
 }
@@ -144,8 +149,8 @@ bool RigidBodies::something_approaches() const noexcept {
 }
 
 ToolPose RigidBodies::goal_at(const ToolPose& p_hat, const ToolPose& q_old, double share) const noexcept {
-  if (carrier_ == nobody) return moved(q_old, difference(p_hat, q_old) * share);
-  const RigidMover& mover = moving_[carrier_].mover;
+  if (!carrier_) return moved(q_old, difference(p_hat, q_old) * share);
+  const RigidMover& mover = moving_[*carrier_].mover;
   const ToolPose from = mover.was().back(q_old), to = mover.is().back(p_hat);
   return mover.at() * moved(from, difference(to, from) * share);
 }
@@ -155,11 +160,11 @@ void RigidBodies::move_to(double share) noexcept {
 }
 
 ToolPose RigidBodies::carry_to(const ToolPose& q, double share) noexcept {
-  if (carrier_ == nobody) {
+  if (!carrier_) {
     move_to(share);
     return q;
   }
-  const Placement& at = moving_[carrier_].mover.at();
+  const Placement& at = moving_[*carrier_].mover.at();
   const ToolPose on = at.back(q);
   move_to(share);
   return at * on;

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,6 +36,7 @@ class RigidBodies {
   [[nodiscard]] const RigidEntry& entry(const Pair& pair) const noexcept { return setup_->entries[pair.entry]; }
   [[nodiscard]] EdgeLine own_edge(const Pair& pair) const noexcept;    // of the tool, in T
   [[nodiscard]] EdgeLine other_edge(const Pair& pair) const noexcept;  // of the object, in its frame
+  [[nodiscard]] const Vec3& other_point(const Pair& pair) const noexcept;
   // √(μ_tool μ_object) if the part has a friction of its own, else the object's.
   [[nodiscard]] double friction(const Pair& pair) const noexcept;
   void set_friction(std::int32_t object, double friction) noexcept;
@@ -60,22 +62,31 @@ class RigidBodies {
   [[nodiscard]] const Placement* placement(std::uint16_t entry) const noexcept {
     return moves(entry) ? &moving(entry).mover.at() : nullptr;
   }
+  [[nodiscard]] Vec3 direction_in_object(std::uint16_t entry, const Vec3& n_W) const noexcept {
+    const Placement* on = placement(entry);
+    return on == nullptr ? n_W : Vec3(on->R.transpose() * n_W);
+  }
+  [[nodiscard]] Vec3 direction_in_W(std::uint16_t entry, const Vec3& n) const noexcept {
+    const Placement* on = placement(entry);
+    return on == nullptr ? n : Vec3(on->R * n);
+  }
   // The tool in the object's frame.
   [[nodiscard]] View seen_from(std::uint16_t entry, const View& tool) const noexcept;
 
   void set_time(const StepTime& time) noexcept;
   void drive(std::int32_t object, const Pose& X) noexcept;
-  void arrive() noexcept;                    // the step is over
-  void take_time_s(double time_s) noexcept;  // scripted objects are where they are then; driven ones are left out
-  void take_all_as_close() noexcept;         // every object that moves may meet the tool
+  void arrive() noexcept;                   // the step is over
+  void go_to_time(double time_s) noexcept;  // scripted objects are where they are then; driven ones are left out
+  void take_all_as_close() noexcept;        // every object that moves may meet the tool
 
-  // Marks the moving objects that may meet the tool in a step from q to p̂. Returns how far the tool and what it may
-  // meet come together at most, m. If nothing else than one moving object is near, that object carries the step: parts
-  // are then divided, and distances measured, in its frame, where a tool that lies on it hardly moves.
-  [[nodiscard]] double find_approaching(const ToolPose& p_hat, const ToolPose& q) noexcept;
+  // Moves the objects to where they were at q(k−1), and marks those that may meet the tool in a step from q to p̂.
+  // Returns how far the tool and what it may meet come together at most, m. If nothing else than one moving object is
+  // near, that object carries the step: parts are then divided, and distances measured, in its frame, where a tool that
+  // lies on it hardly moves.
+  [[nodiscard]] double begin_step(const ToolPose& p_hat, const ToolPose& q) noexcept;
   [[nodiscard]] bool something_approaches() const noexcept;
-  [[nodiscard]] bool has_carrier() const noexcept { return carrier_ != nobody; }
-  void drop_carrier() noexcept { carrier_ = nobody; }
+  [[nodiscard]] bool has_carrier() const noexcept { return carrier_.has_value(); }
+  void drop_carrier() noexcept { carrier_.reset(); }
 
   // p̂ of a part of the step that ends at this share of it.
   [[nodiscard]] ToolPose goal_at(const ToolPose& p_hat, const ToolPose& q_old, double share) const noexcept;
@@ -91,20 +102,16 @@ class RigidBodies {
   // Slip of the tool's material point that is at `point` at a pose, on any object, m.
   [[nodiscard]] Vec3 slip_since_m(const ToolPose& q_old, std::uint16_t entry, const Vec3& point,
                                   const ToolPose& pose) const noexcept;
-  // Largest coordinate of the moving objects that are close, m: places are rounded with it.
-  [[nodiscard]] double extent_m() const noexcept { return extent_m_; }
 
  private:
-  static constexpr std::size_t nobody = static_cast<std::size_t>(-1);
-
   [[nodiscard]] double room_m(std::uint16_t entry, const ToolPose& pose) const noexcept;
-  [[nodiscard]] std::size_t only_one_near(const ToolPose& q, double near) const noexcept;
+  [[nodiscard]] std::optional<std::size_t> only_one_near(const ToolPose& q, double near) const noexcept;
 
   std::shared_ptr<const RigidSetup> setup_;
   std::vector<double> friction_;     // of each entry
   std::vector<MovingEntry> moving_;  // of each entry that moves
-  double extent_m_ = 0.0;
-  std::size_t carrier_ = nobody;  // index in moving_
+  double extent_m_ = 0.0;  // largest Σ|coordinate| of the moving objects that are close: places are rounded with it
+  std::optional<std::size_t> carrier_;  // index in moving_
 };
 
 }  // namespace proxarm::models

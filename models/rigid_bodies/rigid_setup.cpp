@@ -57,6 +57,10 @@ void require_friction(double friction) {
   }
 }
 
+void require_few_edges(const Solid& solid) {
+  if (solid.edges.size() > NearFaces::most_edges) throw std::invalid_argument("a hull of more than 2000 points");
+}
+
 // Whether both have edges that may meet, one of them round.
 bool meet_along_edges(const Solid& part, const RigidEntry& entry) {
   const Solid* solid = entry.solid();
@@ -92,9 +96,7 @@ MeshPart part_of(const ToolPart& part) {
 void add_part(const ToolPart& part, RigidSetup& setup) {
   auto [mesh, solid, thick] = part_of(part);
   if (part.friction) require_friction(*part.friction);
-  if (!mesh && solid.edges.size() > NearFaces::most_edges) {
-    throw std::invalid_argument("a hull of more than 2000 points");
-  }
+  if (!mesh) require_few_edges(solid);
   setup.thinness_m = std::min(setup.thinness_m, thick);
   setup.mesh_tool = setup.mesh_tool || mesh;
   setup.reach_m = std::max(setup.reach_m, solid.reach);
@@ -113,6 +115,7 @@ void add_entry(RigidObject&& object, RigidSetup& setup) {
   }
   entry.bounds = entry.box = bounds_of(entry);
   if (const Solid* solid = entry.solid()) {
+    require_few_edges(*solid);
     setup.thinness_m = std::min(setup.thinness_m, thickness(*solid));
     entry.box = bounds_of(*solid, 0.0);
     entry.cylinder = cylinder_in(*solid);
@@ -141,7 +144,6 @@ bool has_many_corners(const RigidSetup& setup) {
 RigidSetup rigid_setup(const Tool& tool, std::vector<RigidObject> objects) {
   if (tool.parts.empty()) throw std::invalid_argument("a rigid tool needs a part; a point is rendered by a World");
   RigidSetup setup;
-  setup.thinness_m = std::numeric_limits<double>::infinity();
   for (const ToolPart& part : tool.parts) add_part(part, setup);
   for (RigidObject& object : objects) {
     if (!object.motion) add_entry(std::move(object), setup);

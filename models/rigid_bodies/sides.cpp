@@ -8,16 +8,15 @@ namespace {
 
 bool is_behind_reach(double height, double far) noexcept { return height < -2.0 * far - kFront_m; }
 
-// A point under a face of a body without having gone through it is in front of the face, or behind it with its foot
-// beside the face, as beyond an edge. With its foot on the face it is behind the body's far side, which is near next to
-// an edge, however thick the body is.
+// A point of an object over a face of the tool. 1: the point is in front of the face, or behind it with its foot beside
+// the face, as beyond an edge. 0: it is too far behind, or its foot is on the face: then it came from the body's far
+// side, which is near next to an edge, however thick the body is.
 double side_of_tools_face(const RigidBodies& bodies, const Pair& pair, const View& at, double height,
                           double far) noexcept {
   if (height >= -kFront_m) return 1.0;
   if (is_behind_reach(height, far)) return 0.0;
   const Solid& own = bodies.part(pair).solid;
-  const TriangleFeatures* mesh = bodies.entry(pair).mesh();
-  const Vec3 y = at.to_T(mesh != nullptr ? mesh->vertex(pair.other) : bodies.entry(pair).solid()->points[pair.other]);
+  const Vec3 y = at.to_T(bodies.other_point(pair));
   const Solid::Face& face = own.faces[pair.own];
   return touch_face(y, 0.0, face.normal, face.offset, own.points, own.corners(face), 1.0).has_value() ? 0.0 : 1.0;
 }
@@ -61,15 +60,14 @@ double side_of_mesh(const RigidBodies& bodies, const Pair& pair, const View& at,
 double signed_height_m(const RigidBodies& bodies, const Pair& pair, const View& at) noexcept {
   const Solid& own = bodies.part(pair).solid;
   const TriangleFeatures* mesh = bodies.entry(pair).mesh();
-  const Solid* solid = bodies.entry(pair).solid();
   if (pair.kind == PairKind::point_face) {
     const Vec3 p = at * own.points[pair.own];
     if (mesh != nullptr) return TriangleMesh::height(face_of(*mesh, pair.other), p);
-    const Solid::Face& face = solid->faces[pair.other];
+    const Solid::Face& face = bodies.entry(pair).solid()->faces[pair.other];
     return face.normal.dot(p) - face.offset;
   }
   if (pair.kind == PairKind::face_point) {
-    const Vec3& p = mesh != nullptr ? mesh->vertex(pair.other) : solid->points[pair.other];
+    const Vec3& p = bodies.other_point(pair);
     const Solid::Face& face = own.faces[pair.own];
     return face.normal.dot(at.R.transpose() * (p - at.x)) - face.offset;
   }
@@ -95,8 +93,7 @@ void Sides::take(RigidBodies& bodies, std::span<Pair> pairs, const ToolPose& q, 
   }
   for (Pair& pair : pairs) {
     pair.barred = false;
-    if (pair.kind != PairKind::point_face && pair.kind != PairKind::face_point && pair.kind != PairKind::edges)
-      continue;
+    if (!is_point_and_face(pair.kind) && pair.kind != PairKind::edges) continue;
     const View& at = bodies.moves(pair.entry) ? bodies.moving(pair.entry).from : at_W;
     const bool is_mesh = bodies.entry(pair).mesh() != nullptr;
     const double height = signed_height_m(bodies, pair, at);
@@ -114,7 +111,7 @@ void Sides::take(RigidBodies& bodies, std::span<Pair> pairs, const ToolPose& q, 
   }
 }
 
-View Sides::from_of(const RigidBodies& bodies, const Pair& pair) const noexcept {
+View Sides::tool_at_start(const RigidBodies& bodies, const Pair& pair) const noexcept {
   return bodies.moves(pair.entry) ? bodies.moving(pair.entry).from : view(from_);
 }
 
@@ -131,7 +128,7 @@ bool Sides::went_through(const RigidBodies& bodies, const Pair& pair, const Vec3
   const Solid& own = bodies.part(pair).solid;
   const TriangleFeatures& mesh = *bodies.entry(pair).mesh();
   const TriangleMesh::Face& face = face_of(mesh, pair.other);
-  const Vec3 was = from_of(bodies, pair) * own.points[pair.own];
+  const Vec3 was = tool_at_start(bodies, pair) * own.points[pair.own];
   const double before = TriangleMesh::height(face, was), after = TriangleMesh::height(face, p);
   if (pair.pressed || before * after >= 0.0) return true;
   const Vec3 there = was + before / (before - after) * (p - was);

@@ -21,7 +21,7 @@ class Sides {
 
   [[nodiscard]] const ToolPose& from() const noexcept { return from_; }
   // The tool where the sides were taken, in the frame of the pair's object.
-  [[nodiscard]] View from_of(const RigidBodies& bodies, const Pair& pair) const noexcept;
+  [[nodiscard]] View tool_at_start(const RigidBodies& bodies, const Pair& pair) const noexcept;
   // How far behind a feature the tool may be and still be held by it, m.
   [[nodiscard]] double reach_m() const noexcept { return reach_m_; }
   // How far the tool has come since, relative to what it may meet, m.

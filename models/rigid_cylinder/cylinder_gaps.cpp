@@ -108,7 +108,7 @@ bool CylinderGaps::counts(const Pair& pair, const AtCylinder& here, double besid
 // Whether a place of a rim was behind a mesh's face at the beginning without having gone through it: further behind
 // than the sides reach, or with its foot on the face.
 bool CylinderGaps::was_behind_face(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept {
-  const Vec3 was = here.elsewhere(place, sides_->from_of(*bodies_, pair));
+  const Vec3 was = here.elsewhere(place, sides_->tool_at_start(*bodies_, pair));
   const BesideCylinder::Face face = here.body.face(here.feature);
   const double height = face.normal.dot(was) - face.offset;
   if (height >= -kFront_m) return false;
@@ -119,7 +119,7 @@ bool CylinderGaps::was_behind_face(const Pair& pair, const AtCylinder& here, con
 // of its faces: it came around an edge.
 bool CylinderGaps::came_around(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept {
   const BesideCylinder::Face face = here.body.face(here.feature);
-  return face.normal.dot(here.elsewhere(place, sides_->from_of(*bodies_, pair))) - face.offset < -kFront_m &&
+  return face.normal.dot(here.elsewhere(place, sides_->tool_at_start(*bodies_, pair))) - face.offset < -kFront_m &&
          is_outside(*here.body.solid(), place);
 }
 
@@ -127,7 +127,7 @@ bool CylinderGaps::came_around(const Pair& pair, const AtCylinder& here, const V
 bool CylinderGaps::was_behind_edge(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept {
   const Solid::Rim& rim = here.cylinder.rims[here.round];
   const Vec2 in_rim((place - rim.centre).dot(rim.u), (place - rim.centre).dot(rim.v));
-  const Cylinder was = seen_from_body(pair, sides_->from_of(*bodies_, pair));
+  const Cylinder was = seen_from_body(pair, sides_->tool_at_start(*bodies_, pair));
   return height_of_rim(was, here.round, here.body.edge(here.feature), in_rim) < -sides_->reach_m();
 }
 
@@ -149,7 +149,7 @@ const Cylinder& CylinderGaps::kept_cylinder(const Pair& pair, const View& at) no
   return cylinder_;
 }
 
-int CylinderGaps::touch(const Pair& pair, const View& at, double beside, Touches& out) noexcept {
+int CylinderGaps::touch(const Pair& pair, const View& at, double beside, Places& out) noexcept {
   if (is_of_two_cylinders(pair.kind)) return touch_two(pair, at, beside, out);
   const AtCylinder here(*bodies_, pair, at, kept_cylinder(pair, at));
   Meetings places;

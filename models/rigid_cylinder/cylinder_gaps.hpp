@@ -14,14 +14,14 @@ namespace proxarm::models {
 
 class CylinderGaps {
  public:
-  using Touches = std::array<Touch, 4>;
+  using Places = std::array<Touch, 4>;
 
   CylinderGaps(const RigidBodies& bodies, const Sides& sides) noexcept : bodies_(&bodies), sides_(&sides) {}
 
   // The places where the two may touch, in the object's frame, with the tool at `at` in that frame. The gap is infinite
-  // at a place that doesn't count. `beside_m`: how far beside a face or an edge's end a foot may lie. Returns their
+  // at a place that doesn't count. `beside`: how far beside a face or an edge's end a foot may lie. Returns their
   // number. A call for the same part and entry as the last one must have the same `at`.
-  [[nodiscard]] int touch(const Pair& pair, const View& at, double beside, Touches& out) noexcept;
+  [[nodiscard]] int touch(const Pair& pair, const View& at, double beside, Places& out) noexcept;
   // The rim of a pair, and the flat side under it.
   [[nodiscard]] FlatSide side_under_rim(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept;
 
@@ -41,7 +41,7 @@ class CylinderGaps {
 
   [[nodiscard]] static int meet(const Pair& pair, const TwoCylinders& here, double beside, Meetings& out) noexcept;
   [[nodiscard]] bool counts(const Pair& pair, const TwoCylinders& here, const Meeting& meeting) const noexcept;
-  [[nodiscard]] int touch_two(const Pair& pair, const View& at, double beside, Touches& out) const noexcept;
+  [[nodiscard]] int touch_two(const Pair& pair, const View& at, double beside, Places& out) const noexcept;
   [[nodiscard]] FlatSide end_under_rim(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept;
 
   const RigidBodies* bodies_;

@@ -69,14 +69,14 @@ bool CylinderGaps::counts(const Pair& pair, const TwoCylinders& here, const Meet
     default: {
       const Solid::Rim& rim = here.own.rims[pair.own];
       const Vec3 arm = meeting.on_other - rim.centre;
-      const TwoCylinders was(*bodies_, pair, sides_->from_of(*bodies_, pair));
+      const TwoCylinders was(*bodies_, pair, sides_->tool_at_start(*bodies_, pair));
       const Vec2 place(arm.dot(rim.u), arm.dot(rim.v));
       return !(height_of_rims(was.own, pair.own, was.other, pair.other, place) < -sides_->reach_m());
     }
   }
 }
 
-int CylinderGaps::touch_two(const Pair& pair, const View& at, double beside, Touches& out) const noexcept {
+int CylinderGaps::touch_two(const Pair& pair, const View& at, double beside, Places& out) const noexcept {
   const TwoCylinders here(*bodies_, pair, at);
   Meetings places;
   const int count = meet(pair, here, beside, places);

@@ -117,9 +117,7 @@ bool add_bend_of_sides(const RigidBodies& bodies, const Pair& pair, const Found&
 bool add_bend(const RigidBodies& bodies, const Pair& pair, const Found& found, const ToolPose& pose, double force,
               Mat6& K) noexcept {
   if (is_along_side(pair.kind)) return add_bend_of_sides(bodies, pair, found, pose, force, K);
-  if (pair.kind == PairKind::rim_field || pair.kind == PairKind::point_field) {
-    return add_bend_in_field(bodies, pair, found, pose, force, K);
-  }
+  if (is_in_field(pair.kind)) return add_bend_in_field(bodies, pair, found, pose, force, K);
   return is_flat_rim(pair.kind) && add_bend_of_rim(bodies, pair, found, pose, force, K);
 }
 
@@ -141,10 +139,7 @@ double sine_of_rims(const RigidBodies& bodies, const Pair& pair, const Touch& to
   const Vec3& n = touch.normal;
   const std::optional<Cylinder>&own = bodies.part(pair).cylinder, &other = bodies.entry(pair).cylinder;
   const auto along = [](const EdgeLine& edge) { return Vec3(edge.to - edge.from); };
-  const auto in_W = [&](const Vec3& of_object) {
-    const Placement* on = bodies.placement(pair.entry);
-    return on != nullptr ? Vec3(on->R * of_object) : of_object;
-  };
+  const auto in_W = [&](const Vec3& of_object) { return bodies.direction_in_W(pair.entry, of_object); };
   const Vec3 along_own =
       own ? Vec3((pose.orientation * own->axis).cross(n)) : Vec3(pose.orientation * along(bodies.own_edge(pair)));
   const Vec3 along_other = other ? Vec3(in_W(other->axis).cross(n)) : in_W(along(bodies.other_edge(pair)));

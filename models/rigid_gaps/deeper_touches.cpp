@@ -3,7 +3,7 @@
 #include <limits>
 #include <utility>
 
-#include "models/rigid_gaps/touch_search.hpp"
+#include "models/rigid_gaps/deeper_touches.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -100,7 +100,7 @@ bool DeeperTouches::is_beside(const Found& deep) const noexcept {
     const Vec3& n = touches_.found[j].touch.normal;
     if (by.entry != pair.entry || by.part != pair.part || touches_.found[j].touch.gap < half) continue;
     if (n.dot(deep.touch.normal) > 0.5) continue;
-    const Vec3 n_T = at_.R.transpose() * n, n_O = on == nullptr ? n : Vec3(on->R.transpose() * n);
+    const Vec3 n_T = at_.R.transpose() * n, n_O = bodies_.direction_in_object(pair.entry, n);
     const double low = -extent_along(own, -n_T),
                  high = extent_along(*other, n_O) + (on != nullptr ? n.dot(on->x) : 0.0);
     if (low + n.dot(at_.x) - high > half) return true;
@@ -140,9 +140,8 @@ bool DeeperTouches::leans_into(const Found& corner) const noexcept {
   if (other == nullptr) return false;
   const bool own_corner = pair.kind == PairKind::point_face;
   if (own_corner && bodies_.part(pair).mesh) return false;  // it isn't convex
-  const Placement* on = bodies_.placement(pair.entry);
   // Out of the face, in the frame of the solid whose corner it is.
-  const Vec3 n_O = on == nullptr ? corner.touch.normal : Vec3(on->R.transpose() * corner.touch.normal);
+  const Vec3 n_O = bodies_.direction_in_object(pair.entry, corner.touch.normal);
   const Vec3 n = own_corner ? Vec3(at_.R.transpose() * corner.touch.normal) : Vec3(-n_O);
   const Solid& solid = own_corner ? bodies_.part(pair).solid : *other;
   const Vec3& tip = solid.points[own_corner ? pair.own : pair.other];
@@ -177,7 +176,7 @@ void DeeperTouches::drop_leaning_corners() noexcept {
   auto& found = touches_.found;
   for (std::size_t i = 0; i < touches_.count; ++i) {
     const PairKind kind = pair_of(found[i]).kind;
-    if (!(found[i].touch.gap < -kGap_m) || (kind != PairKind::point_face && kind != PairKind::face_point)) continue;
+    if (!(found[i].touch.gap < -kGap_m) || !is_point_and_face(kind)) continue;
     for (std::size_t j = 0; j < touches_.count; ++j) {
       if (j == i || found[j].touch.gap < found[i].touch.gap) continue;
       if (!same_point(pair_of(found[i]), pair_of(found[j]))) continue;
@@ -194,7 +193,7 @@ bool DeeperTouches::holds_nothing(const Found& deep) const noexcept {
   const Pair& pair = pair_of(deep);
   const bool is_sharp = pair.kind == PairKind::edges || pair.kind == PairKind::rim_edge || pair.kind == PairKind::rims;
   if (is_sharp) return is_beside(deep) || passes_by(deep);
-  if (pair.kind != PairKind::point_face && pair.kind != PairKind::face_point) return false;
+  if (!is_point_and_face(pair.kind)) return false;
   const auto holds_it = [&](const Found& other) { return &other != &deep && is_held_instead(deep, other); };
   const std::span<const Found> all = std::as_const(touches_).all();
   return std::any_of(all.begin(), all.end(), holds_it);
@@ -222,7 +221,7 @@ void drop_deeper(const RigidBodies& bodies, const Candidates& candidates, const 
 }
 
 bool reaches_beyond(const RigidBodies& bodies, const Pair& pair, const Touch& touch, const View& at) noexcept {
-  if (pair.kind == PairKind::point_field || pair.kind == PairKind::rim_field) return false;
+  if (is_in_field(pair.kind)) return false;
   const RigidPart& part = bodies.part(pair);
   const Vec3 &n = touch.normal, &x = touch.point;
   if (!part.mesh) {
@@ -232,7 +231,7 @@ bool reaches_beyond(const RigidBodies& bodies, const Pair& pair, const Touch& to
   const Solid* solid = bodies.entry(pair).solid();
   if (solid == nullptr) return false;
   const Placement* on = bodies.placement(pair.entry);
-  const Vec3 foot = x - touch.gap * n, up = on == nullptr ? n : Vec3(on->R.transpose() * n);
+  const Vec3 foot = x - touch.gap * n, up = bodies.direction_in_object(pair.entry, n);
   return extent_along(*solid, up) > up.dot(on == nullptr ? foot : on->back(foot)) + kBeyond_m;
 }
 

@@ -32,7 +32,7 @@ void Gaps::remember_lowest(Pair& pair, const View& at) const noexcept {
 }
 
 int Gaps::evaluate(const Pair& pair, const View& at, double beside, Places& out) noexcept {
-  if (pair.kind == PairKind::point_field || pair.kind == PairKind::rim_field) return evaluate_field(pair, at, out);
+  if (is_in_field(pair.kind)) return evaluate_field(pair, at, out);
   if (is_of_cylinder(pair.kind)) return cylinders_.touch(pair, at, beside, out);
   const std::optional<Touch> touch = evaluate_one(pair, at, beside);
   if (!touch) return 0;
@@ -57,11 +57,6 @@ int Gaps::evaluate_field(const Pair& pair, const View& at, Places& out) const no
   return count;
 }
 
-Vec3 Gaps::other_point(const Pair& pair) const noexcept {
-  const TriangleFeatures* mesh = bodies_->entry(pair).mesh();
-  return mesh != nullptr ? mesh->vertex(pair.other) : bodies_->entry(pair).solid()->points[pair.other];
-}
-
 // Pairs that touch at one place at most.
 std::optional<Touch> Gaps::evaluate_one(const Pair& pair, const View& at, double beside) const noexcept {
   const Solid& own = bodies_->part(pair).solid;
@@ -76,14 +71,14 @@ std::optional<Touch> Gaps::evaluate_one(const Pair& pair, const View& at, double
     case PairKind::round_edges:
       return touch_edges_round(moved_edge(bodies_->own_edge(pair), at), bodies_->other_edge(pair), radii, own.radius);
     case PairKind::point_point: {
-      std::optional<Touch> t = touch_point(at * own.points[pair.own], other_point(pair), radii);
+      std::optional<Touch> t = touch_point(at * own.points[pair.own], bodies_->other_point(pair), radii);
       if (t) t->point -= own.radius * t->normal;
       return t;
     }
     case PairKind::point_edge:
       return touch_round(at * own.points[pair.own], bodies_->other_edge(pair), radii, own.radius, false);
     case PairKind::edge_point:
-      return touch_round(other_point(pair), moved_edge(bodies_->own_edge(pair), at), radii, own.radius, true);
+      return touch_round(bodies_->other_point(pair), moved_edge(bodies_->own_edge(pair), at), radii, own.radius, true);
     default:
       return {};
   }
@@ -116,7 +111,7 @@ std::optional<Touch> Gaps::face_point(const Pair& pair, const View& at, double b
   const Solid& own = bodies_->part(pair).solid;
   const double other_radius = radius_of(bodies_->entry(pair).solid());
   const Solid::Face& face = own.faces[pair.own];
-  const Vec3 y = at.R.transpose() * (other_point(pair) - at.x);
+  const Vec3 y = at.R.transpose() * (bodies_->other_point(pair) - at.x);
   const std::optional<Touch> t =
       touch_face(y, other_radius, face.normal, face.offset, own.points, own.corners(face), 1.0, beside);
   if (!t) return {};
@@ -159,7 +154,7 @@ std::optional<Touch> Gaps::over_valley(const Pair& pair, const View& at, const F
   const std::uint8_t valleys = features->valleys_of(index, side);
   if (valleys == 0) return {};
   const double radius = ours ? radius_of(entry.solid()) : part.solid.radius;
-  const Vec3 p = !ours ? at * part.solid.points[pair.own] : at.to_T(other_point(pair));
+  const Vec3 p = !ours ? at * part.solid.points[pair.own] : at.to_T(bodies_->other_point(pair));
   const Vec3& n = face_of(*features, index).normal;
   for (std::size_t k = 0; k < 3; ++k) {
     const Vec3& corner = features->mesh().corner(index, k);
@@ -183,11 +178,12 @@ int Gaps::evaluate_over(const Pair& pair, const View& at, const FootReach& feet,
 
 bool Gaps::is_beyond_edge(const Pair& pair, double gap, const View& at) const noexcept {
   const bool of_tool = pair.kind == PairKind::face_point;
-  if (!(gap < -kGap_m) || (!of_tool && pair.kind != PairKind::point_face)) return false;
+  if (!(gap < -kGap_m) || !is_point_and_face(pair.kind)) return false;
   const RigidPart& part = bodies_->part(pair);
   const Solid* solid = !of_tool ? bodies_->entry(pair).solid() : part.mesh ? nullptr : &part.solid;
-  if (solid == nullptr || !(signed_height_m(*bodies_, pair, sides_->from_of(*bodies_, pair)) < -kFront_m)) return false;
-  const Vec3 y = !of_tool ? at * part.solid.points[pair.own] : at.to_T(other_point(pair));
+  if (solid == nullptr || !(signed_height_m(*bodies_, pair, sides_->tool_at_start(*bodies_, pair)) < -kFront_m))
+    return false;
+  const Vec3 y = !of_tool ? at * part.solid.points[pair.own] : at.to_T(bodies_->other_point(pair));
   const Solid::Face& face = solid->faces[of_tool ? pair.own : pair.other];
   return face.normal.dot(y) - face.offset < -kGap_m && is_outside(*solid, y);
 }

@@ -12,13 +12,13 @@ namespace proxarm::models {
 // At one pose of the tool. Views lead from T to the frame of the pair's object, and touches are in that frame.
 class Gaps {
  public:
-  using Places = CylinderGaps::Touches;
+  using Places = CylinderGaps::Places;
 
   Gaps(const RigidBodies& bodies, const Sides& sides) noexcept
       : bodies_(&bodies), sides_(&sides), cylinders_(bodies, sides) {}
 
   // The places where the two touch or may touch. Returns their number; 0 if no foot lies on the other feature.
-  // `beside_m`: how far beside a feature a foot may lie.
+  // `beside`: how far beside a feature a foot may lie.
   [[nodiscard]] int evaluate(const Pair& pair, const View& at, double beside, Places& out) noexcept;
   // The same for a pair that pressed in the last solution, up to `over` beyond a valley or an edge's end.
   //
@@ -41,7 +41,6 @@ class Gaps {
   [[nodiscard]] std::optional<Touch> sharp_edges(const Pair& pair, const View& at, double beside) const noexcept;
   [[nodiscard]] std::optional<Touch> over_valley(const Pair& pair, const View& at,
                                                  const FootReach& feet) const noexcept;
-  [[nodiscard]] Vec3 other_point(const Pair& pair) const noexcept;
 
   const RigidBodies* bodies_;
   const Sides* sides_;

@@ -25,7 +25,7 @@ std::optional<NearSides> near_sides(const RigidBodies& bodies, const Pair& pair,
   NearSides sides;
   sides.u = pose.orientation * (own ? own->axis : along(bodies.own_edge(pair)));
   sides.v = other ? other->axis : along(bodies.other_edge(pair));
-  if (const Placement* on = bodies.placement(pair.entry)) sides.v = on->R * sides.v;
+  sides.v = bodies.direction_in_W(pair.entry, sides.v);
   sides.own_radius = own ? own->radius : bodies.part(pair).solid.radius;
   sides.D = touch.gap + sides.own_radius;
   if (other) sides.D += other->radius;

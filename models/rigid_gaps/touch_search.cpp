@@ -1,14 +1,17 @@
 #include "models/rigid_gaps/touch_search.hpp"
 
 #include <algorithm>
+#include <utility>
 
+#include "models/rigid_gaps/deeper_touches.hpp"
 #include "models/rigid_gaps/gaps.hpp"
 #include "models/rigid_gaps/near_sides.hpp"
 
 namespace proxarm::models {
 namespace {
 
-// Cost of a pair of a cylinder's features beyond that of others, in their 15 ns: 120 to 150 ns.
+// Cost of a pair beyond that of a pair of flat features, in units of that (15 ns): a cylinder and another body, two
+// cylinders, two rims.
 constexpr int kOfCylinder = 10, kOfTwoCylinders = 30, kRims = 600;
 
 int extra_cost(PairKind kind) noexcept {

@@ -8,6 +8,8 @@
 
 namespace proxarm::models {
 
+class Gaps;
+
 class TouchSearch {
  public:
   TouchSearch(RigidBodies& bodies, Candidates& candidates, const Sides& sides, Attempt& attempt, Touches& out) noexcept
@@ -18,8 +20,7 @@ class TouchSearch {
 
  private:
   void look_at_pairs(const ToolPose& pose, double within_m) noexcept;
-  void look_at(std::size_t index, const View& at, const MovingEntry* on, const ToolPose& pose,
-               class Gaps& gaps) noexcept;
+  void look_at(std::size_t index, const View& at, const MovingEntry* on, const ToolPose& pose, Gaps& gaps) noexcept;
   void add(const Touch& touch, std::size_t index, int which, const MovingEntry* on, const ToolPose& pose) noexcept;
   [[nodiscard]] bool needs_others(const Found& found) const noexcept;
 
@@ -29,14 +30,5 @@ class TouchSearch {
   Attempt* attempt_;
   Touches* out_;
 };
-
-// Drops touches of features that the tool is behind but that don't hold it: of all faces that a point is under, only
-// the one that it is least deep under does.
-void drop_deeper(const RigidBodies& bodies, const Candidates& candidates, const View& at, Touches& touches) noexcept;
-// Whether one of the two convex bodies that touch reaches beyond the plane between them: then the normal is outside of
-// the cone of normals that this body has there. This is so where a corner has its foot on a face, on the border of that
-// face or on the rim of a cylinder's side, while the corner's own edges lead away.
-[[nodiscard]] bool reaches_beyond(const RigidBodies& bodies, const Pair& pair, const Touch& touch,
-                                  const View& at) noexcept;
 
 }  // namespace proxarm::models

@@ -5,8 +5,11 @@
 #include "models/rigid_features/near_faces.hpp"
 
 namespace proxarm::models {
+namespace {
 
 constexpr std::size_t kMostLeaves = 4096;  // of two meshes that are near each other
+
+}  // namespace
 
 const PressedPlaces::Place* PressedPlaces::of(std::uint16_t pair, std::uint8_t which) const noexcept {
   for (std::size_t k = 0; k < count; ++k) {

@@ -49,8 +49,8 @@ struct Candidates {
   std::size_t still_count = 0;  // the first pairs are with objects that stand still, the others with objects that move
   ToolPose gathered_at;
   double gathered_reach_m = -1.0;
-  bool crowded = false;        // there was no room for all pairs
-  std::size_t near_faces = 0;  // triangles that were near
+  bool crowded = false;            // there was no room for all pairs
+  std::size_t triangles_near = 0;  // how many were looked at
   PressedPlaces pressed;
   NearLeaves near_leaves;        // of two meshes, for objects that stand still
   double list_further = 2.0;     // leaves are listed this many times as far around as pairs are gathered

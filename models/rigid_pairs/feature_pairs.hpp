@@ -114,13 +114,13 @@ class PairsOfSolids {
 template <typename Add>
 class PairsWithMesh {
  public:
-  PairsWithMesh(const Solid& own, const TriangleFeatures& mesh, double side, const View& at, NearFaces& close,
+  PairsWithMesh(const Solid& solid, const TriangleFeatures& mesh, double side, const View& at, NearFaces& close,
                 const bool& crowded, Add add) noexcept
-      : own_(own), mesh_(mesh), side_(side), at_(at), close_(close), crowded_(crowded), add_(add) {}
+      : solid_(solid), mesh_(mesh), side_(side), at_(at), close_(close), crowded_(crowded), add_(add) {}
 
   void add_all() noexcept {
-    for (std::uint32_t i = 0; i < own_.points.size(); ++i) own_point(i);
-    if (own_.edges.empty()) return;
+    for (std::uint32_t i = 0; i < solid_.points.size(); ++i) solid_corner(i);
+    if (solid_.edges.empty()) return;
     // The normals of a body seen from inside are reversed.
     const Mat3 to_T = (side_ < 0.0 ? -1.0 : 1.0) * at_.R.transpose();
     for (const std::uint32_t face : close_.faces()) {
@@ -130,7 +130,7 @@ class PairsWithMesh {
         const TriangleFeatures::Edge& edge = mesh_.edge(e);
         // A valley of a closed mesh is touched by nothing sharp.
         const bool is_valley = side_ != 0.0 && !edge.line.open && edge.ridge != (side_ > 0.0);
-        if (is_valley && !(own_.radius > 0.0)) continue;
+        if (is_valley && !(solid_.radius > 0.0)) continue;
         edge_of_mesh(e);
       }
     }
@@ -139,12 +139,12 @@ class PairsWithMesh {
  private:
   void within(double distance2, PairKind kind, std::uint32_t i, std::uint32_t j) const noexcept {
     const double near = close_.near();
-    if (distance2 <= near * near) add_(kind, i, j, std::sqrt(distance2) - own_.radius);
+    if (distance2 <= near * near) add_(kind, i, j, std::sqrt(distance2) - solid_.radius);
   }
-  void own_point(std::uint32_t i) const noexcept {
-    if (!close_.meets(own_.points[i], own_.points[i]) || !close_.faces_some(own_.cones.of_corners[i])) return;
-    const Vec3 p = at_ * own_.points[i];
-    const NormalCone cone = own_.cones.of_corners[i].seen_by(at_.R);
+  void solid_corner(std::uint32_t i) const noexcept {
+    if (!close_.meets(solid_.points[i], solid_.points[i]) || !close_.faces_some(solid_.cones.of_corners[i])) return;
+    const Vec3 p = at_ * solid_.points[i];
+    const NormalCone cone = solid_.cones.of_corners[i].seen_by(at_.R);
     const double near = close_.near();
     mesh_.mesh().within(p, near, [&](std::uint32_t face) {
       if (crowded_) return false;
@@ -153,7 +153,7 @@ class PairsWithMesh {
       const NormalCone::Angle turn = mesh_.around(face) + close_.corners_turn();
       const bool may_rest = side_ == 0.0 || cone.holds(-side_ * face_of(mesh_, face).normal, turn);
       if (may_rest) within(distance2, PairKind::point_face, i, face);
-      if (!(own_.radius > 0.0)) return true;
+      if (!(solid_.radius > 0.0)) return true;
       for (const std::uint32_t v : mesh_.vertices_of(face)) {
         within((p - mesh_.vertex(v)).squaredNorm(), PairKind::point_point, i, v);
       }
@@ -168,15 +168,16 @@ class PairsWithMesh {
     if (!close_.beyond(y)) {
       const NormalCone cone = mesh_.cone(v).seen_by(to_T);
       for (const std::uint16_t i : close_.facing()) {
-        const Solid::Face& face = own_.faces[i];
+        const Solid::Face& face = solid_.faces[i];
         if (!(std::abs(face.normal.dot(y) - face.offset) <= close_.near())) continue;
-        if (!cone.holds(-face.normal, own_.cones.around_faces[i] + close_.corners_turn())) continue;
-        within(distance2_within(own_, face, y, close_.near()), PairKind::face_point, i, v);
+        if (!cone.holds(-face.normal, solid_.cones.around_faces[i] + close_.corners_turn())) continue;
+        within(distance2_within(solid_, face, y, close_.near()), PairKind::face_point, i, v);
       }
     }
-    if (!(own_.radius > 0.0)) return;
-    close_.each_crossing(
-        y, y, [&](std::uint16_t i) { within(distance2_to_segment(y, edge_of(own_, i)), PairKind::edge_point, i, v); });
+    if (!(solid_.radius > 0.0)) return;
+    close_.each_crossing(y, y, [&](std::uint16_t i) {
+      within(distance2_to_segment(y, edge_of(solid_, i)), PairKind::edge_point, i, v);
+    });
   }
   // An edge of the mesh with the solid's edges.
   void edge_of_mesh(std::uint32_t e) noexcept {
@@ -186,15 +187,15 @@ class PairsWithMesh {
     std::optional<EdgeLine> line;  // in T; few edges are asked for more than their ends
     close_.each_crossing(from.cwiseMin(to), from.cwiseMax(to), [&](std::uint16_t i) {
       if (!line) line = edge_in_T(of_mesh.line, at_, of_mesh.ridge ? 1.0 : -1.0);
-      const EdgeLine edge = edge_of(own_, i);
+      const EdgeLine edge = edge_of(solid_, i);
       const double distance2 = distance2_of_segments(edge, *line);
       if (distance2 > close_.near() * close_.near()) return;
-      if (!(own_.radius > 0.0) && never_hold(edge, *line, close_.turn())) return;
-      add_(own_.radius > 0.0 ? PairKind::round_edges : PairKind::edges, i, e, std::sqrt(distance2) - own_.radius);
+      if (!(solid_.radius > 0.0) && never_hold(edge, *line, close_.turn())) return;
+      add_(solid_.radius > 0.0 ? PairKind::round_edges : PairKind::edges, i, e, std::sqrt(distance2) - solid_.radius);
     });
   }
 
-  const Solid& own_;
+  const Solid& solid_;
   const TriangleFeatures& mesh_;
   double side_;
   const View& at_;

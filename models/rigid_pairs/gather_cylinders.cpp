@@ -5,10 +5,10 @@
 
 namespace proxarm::models {
 
-void Gathering::cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
+void Gathering::gather_cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const RigidPart& own = bodies_->setup().parts[part];
   const RigidEntry& other = bodies_->setup().entries[entry];
-  if (own.cylinder && other.cylinder) return cylinders(part, entry, at, reach);
+  if (own.cylinder && other.cylinder) return gather_cylinders(part, entry, at, reach);
   const bool ours = own.cylinder.has_value();
   const View to = ours ? at : inverse(at);
   const BesideCylinder body = beside_cylinder(own, other);
@@ -28,7 +28,7 @@ void Gathering::cylinder(std::uint16_t part, std::uint16_t entry, const View& at
       }
       return true;
     });
-    out_->near_faces += looked_at;
+    out_->triangles_near += looked_at;
     return;
   }
   const Solid& solid = *body.solid();
@@ -37,7 +37,7 @@ void Gathering::cylinder(std::uint16_t part, std::uint16_t entry, const View& at
   for (std::uint32_t i = 0; i < solid.faces.size(); ++i) pairs.face(i);
 }
 
-void Gathering::cylinders(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
+void Gathering::gather_cylinders(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const Cylinder own = moved(*bodies_->setup().parts[part].cylinder, at.R, at.x);
   each_pair_of_cylinders(own, *bodies_->setup().entries[entry].cylinder, reach,
                          [&](PairKind kind, std::uint32_t i, std::uint32_t j) { add(kind, part, entry, i, j, 0.0); });

@@ -104,7 +104,7 @@ void Gathering::list_leaves_within(const ToolPose& pose, double reach) noexcept 
   }
 }
 
-void Gathering::meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
+void Gathering::gather_meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const RigidSetup& setup = bodies_->setup();
   const RigidEntry& e = setup.entries[entry];
   const TriangleFeatures& own = *setup.parts[part].mesh;
@@ -129,7 +129,7 @@ void Gathering::meshes(std::uint16_t part, std::uint16_t entry, const View& at, 
   } else {
     pairs.each(look_at);
   }
-  out_->near_faces += looked_at;
+  out_->triangles_near += looked_at;
 }
 
 }  // namespace proxarm::models

@@ -44,7 +44,7 @@ void Gathering::gather_for(const ToolPose& q, double far_m) noexcept {
   const double least = 1.5 * far_m + 1e-6;
   double reach = 3.0 * far_m + std::max(8.0 * far_m, 0.01 * setup.reach_m) + 1e-6;
   if (setup.dense && out_->gathered_reach_m > 0.0) {
-    const bool few = out_->count < kFewPairs / 4 && out_->near_faces < kFewFaces / 4;
+    const bool few = out_->count < kFewPairs / 4 && out_->triangles_near < kFewFaces / 4;
     reach = std::clamp((few ? 2.0 : 1.0) * out_->gathered_reach_m, least, reach);
   }
   const std::size_t pairs = setup.dense ? kFewPairs : Candidates::most_pairs;
@@ -69,14 +69,14 @@ bool Gathering::look_around(const ToolPose& pose, double reach, std::size_t pair
   const RigidSetup& setup = bodies_->setup();
   pair_room_ = pairs;
   face_room_ = faces;
-  out_->count = out_->pressed.count = out_->near_faces = 0;
+  out_->count = out_->pressed.count = out_->triangles_near = 0;
   out_->crowded = false;
   list_leaves(pose, reach);
   if (out_->near_triangles.has_room()) out_->near_triangles.begin(pose, reach);
-  for (std::size_t i = 0; i < setup.first_moving; ++i) entry(static_cast<std::uint16_t>(i), pose, reach);
+  for (std::size_t i = 0; i < setup.first_moving; ++i) gather_entry(static_cast<std::uint16_t>(i), pose, reach);
   out_->still_count = out_->count;
   for (std::size_t i = setup.first_moving; i < setup.entries.size(); ++i) {
-    entry(static_cast<std::uint16_t>(i), pose, reach);
+    gather_entry(static_cast<std::uint16_t>(i), pose, reach);
     MovingEntry& m = bodies_->moving(static_cast<std::uint16_t>(i));
     m.gathered = m.mover.at().back(pose);
   }
@@ -114,26 +114,26 @@ bool Gathering::may_reach(const RigidPart& part, const RigidEntry& entry, const 
   return distance2_to_box(at * Vec3(0.5 * (part.box.low + part.box.high)), entry.bounds) <= near * near;
 }
 
-void Gathering::entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept {
+void Gathering::gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept {
   const RigidSetup& setup = bodies_->setup();
   const RigidEntry& e = setup.entries[entry];
   const View at = bodies_->seen_from(entry, view(pose));
   const double around = setup.reach_m + reach;
   if (distance2_to_box(at.x, e.bounds) > around * around) return;
   for (std::size_t i = 0; i < setup.parts.size() && !out_->crowded; ++i) {
-    if (may_reach(setup.parts[i], e, at, reach)) part(static_cast<std::uint16_t>(i), entry, at, reach);
+    if (may_reach(setup.parts[i], e, at, reach)) gather_part(static_cast<std::uint16_t>(i), entry, at, reach);
   }
 }
 
-void Gathering::part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
+void Gathering::gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const RigidSetup& setup = bodies_->setup();
   const RigidPart& own = setup.parts[part];
   const RigidEntry& e = setup.entries[entry];
   const Solid* solid = e.solid();
   const TriangleFeatures* mesh = e.mesh();
-  if (solid == nullptr && mesh == nullptr) return flat_or_hollow(part, entry, at, reach);
-  if (e.cylinder || own.cylinder) return cylinder(part, entry, at, reach);
-  if (mesh != nullptr && own.mesh) return meshes(part, entry, at, reach);
+  if (solid == nullptr && mesh == nullptr) return gather_flat_or_hollow(part, entry, at, reach);
+  if (e.cylinder || own.cylinder) return gather_cylinder(part, entry, at, reach);
+  if (mesh != nullptr && own.mesh) return gather_meshes(part, entry, at, reach);
   const double turn = reach / setup.reach_m;
   const auto add_as_is = [&](PairKind kind, std::uint32_t i, std::uint32_t j, double apart_m) {
     add(kind, part, entry, i, j, apart_m);
@@ -154,7 +154,7 @@ void Gathering::part(std::uint16_t part, std::uint16_t entry, const View& at, do
   PairsWithMesh(*solid, *own.mesh, 1.0, from_tool, close, out_->crowded, add_reversed).add_all();
 }
 
-void Gathering::flat_or_hollow(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
+void Gathering::gather_flat_or_hollow(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const Solid& own = bodies_->setup().parts[part].solid;
   with_flat_or_hollow(bodies_->setup().entries[entry].object, [&](const auto& shape) {
     for (std::uint32_t i = 0; i < own.points.size(); ++i) {
@@ -188,7 +188,7 @@ void Gathering::add(PairKind kind, std::uint16_t part, std::uint16_t entry, std:
 bool Gathering::list_triangles(std::uint16_t part, std::uint16_t entry, const NearFaces& close) noexcept {
   out_->crowded = out_->crowded || !close.all();
   if (!close.all()) return false;
-  out_->near_faces += close.faces().size();
+  out_->triangles_near += close.faces().size();
   if (!bodies_->moves(entry) && out_->near_triangles.all()) {
     out_->near_triangles.begin_with(part, entry);
     for (const std::uint32_t face : close.faces()) out_->near_triangles.add(face);

@@ -31,12 +31,12 @@ class Gathering {
   void restore(const KeptPairs& kept) noexcept;
   void list_leaves(const ToolPose& pose, double reach) noexcept;
   void list_leaves_within(const ToolPose& pose, double reach) noexcept;
-  void entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
-  void part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
-  void cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
-  void cylinders(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
-  void meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
-  void flat_or_hollow(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
+  void gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void gather_cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void gather_cylinders(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void gather_meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void gather_flat_or_hollow(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
   void add(PairKind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own, std::uint32_t other,
            double apart_m) noexcept;
   bool list_triangles(std::uint16_t part, std::uint16_t entry, const NearFaces& close) noexcept;

@@ -1,9 +1,9 @@
-// Can the contacts that a 𝒢 reports bear its force? For `proxarm check`, the stress study and the contract tests; the
-// cycle doesn't need it.
+// Tests whether the contacts that a 𝒢 reports can exert the 𝒢's force. Used by `proxarm check`, the stress study and
+// the contract tests; the cycle doesn't use it.
 //
-// By (17), the force f = K (r − p) must be a sum of forces, one per contact: in the friction cone of a sticking
-// contact, on the cone's edge against N Nᵀ (r − q) of a slipping one. in_sum_of_cones (cone_sum.hpp) tests this; the
-// caller, who knows its world, chooses the tolerance for rounding.
+// By (17), the force f = K (r − p) must be a sum of forces, one per contact. The force of a sticking contact is in its
+// friction cone. The force of a slipping contact is on the line of the friction cone that opposes the slip N Nᵀ (r −
+// q). in_sum_of_cones (cone_sum.hpp) tests this. The caller chooses the tolerance for rounding.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@
 
 namespace proxarm::models {
 
-// The factor by which contacts amplify rounding: 4 for a single contact; for nearly parallel contacts 4 over the sine
-// of their angle, at most 4e8.
+// Returns the factor by which contacts amplify rounding: 4 for a single contact; for several contacts 4 over the
+// smallest sine of the angle between two of their normals, at most 4e8.
 template <int N>
 double rounding_amplification(std::span<const Contact<N>> contacts) {
   double least = 1.0;
@@ -32,9 +32,10 @@ double rounding_amplification(std::span<const Contact<N>> contacts) {
   return 4.0 / std::max(least, 1e-8);
 }
 
-// The largest distance (m) that the proxy slid along a contact that is reported to stick. Only this reveals a wall that
-// creeps: (17) lets such a contact bear any force of its cone because N Nᵀ (r − q) = 0 there. Skips contacts with no or
-// unknown friction and those reached over other faces (Contact::reached). Arguments as for cones_of_contacts().
+// Returns the largest distance (m) that the proxy slid along a contact that is reported to stick. This finds a proxy
+// that creeps along a wall; the test of the cones doesn't find it, because (17) lets a sticking contact exert any force
+// of its cone. Skips contacts without friction, contacts with unknown friction, and contacts with Contact::reached. The
+// arguments are those of cones_of_contacts().
 template <int N, typename Friction, typename Motion>
 double creep_m(std::span<const Contact<N>> contacts, Friction friction, Motion motion) {
   double most = 0.0;
@@ -47,13 +48,13 @@ double creep_m(std::span<const Contact<N>> contacts, Friction friction, Motion m
   return most;
 }
 
-// The cone of forces that each contact can bear.
-//   size_m                the size of the coordinates by which r and q are rounded
-//   friction(contact)     μ, or nullopt if unknown: then any force that doesn't pull is accepted
-//   motion(contact)       r − q in 3D as the contact's object sees it: q is carried along with a moving object
-//   slipping(μ, angle)    is called for each slipping contact; rounding of r and q leaves the direction of the slip,
-//                         and so of the force, uncertain by `angle` (rad)
-// If the direction is uncertain by more than 1e-3 rad, the contact counts as sticking and gets its whole cone.
+// Returns, for each contact, the cone of the forces that the contact can exert.
+//   size_m                the size of the coordinates of r and q, which determines their rounding
+//   friction(contact)     returns μ, or nullopt if μ is unknown: then any force that doesn't pull is accepted
+//   motion(contact)       returns r − q in 3D relative to the contact's object: a moving object carries q along
+//   slipping(μ, angle)    is called for each slipping contact; because of the rounding of r and q, the direction of the
+//                         slip, and so of the force, is uncertain by `angle` (rad)
+// If this direction is uncertain by more than 1e-3 rad, the contact counts as sticking and gets its whole cone.
 template <int N, typename Friction, typename Motion, typename Slipping>
 std::vector<ForceCone> cones_of_contacts(std::span<const Contact<N>> contacts, double size_m, Friction friction,
                                          Motion motion, Slipping slipping) {

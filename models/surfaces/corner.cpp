@@ -7,7 +7,8 @@ namespace proxarm::models {
 CornerPoint::CornerPoint(const FlatSurface<3>& a, const FlatSurface<3>& b, const FlatSurface<3>& c) noexcept {
   const Vec3 bc = b.normal().cross(c.normal()), ca = c.normal().cross(a.normal()), ab = a.normal().cross(b.normal());
   const double volume = a.normal().dot(bc);
-  // Rounding of the unit vectors' triple product is a few 1e-16: below 1e-14 the corner has less than two digits.
+  // The triple product of the unit normals has a rounding error of a few 1e-16. If the triple product is below 1e-14,
+  // the corner's position has less than two correct digits.
   exists = std::abs(volume) > 1e-14;
   if (!exists) return;
   dual.row(0) = bc / volume;
@@ -32,8 +33,8 @@ CornerSolution solve_corner(const std::array<PlaneContact, 3>& contacts, const C
     const double speed = v.norm(), own_rounding = surface.rounding(q) + surface.rounding(p);
     rounding += own_rounding;
     in_place = in_place && surface.holds(q);
-    // The corner's position is uncertain by the rounding of heights times ‖dual‖, which grows as one over the angle
-    // between faces.
+    // The corner's position is uncertain by the rounding of the heights times ‖dual‖; ‖dual‖ grows as one over the
+    // angle between the faces.
     const bool rests = speed <= own_rounding * corner.dual.norm();
     out.slips[i] = !rests && mu > 0.0;
     at_rest = at_rest && rests;
@@ -44,10 +45,10 @@ CornerSolution solve_corner(const std::array<PlaneContact, 3>& contacts, const C
     }
   }
   const double tolerance = rounding * corner.dual.norm();
-  // A force in the cone of the normals needs no friction. For three resting contacts this cheap test usually decides.
+  // A force in the cone of the normals needs no friction. For three resting contacts this cheap test usually suffices.
   const Vec3 shares = corner.dual * f;
   out.found = (at_rest && shares.minCoeff() >= 0.0) || in_sum_of_cones(f, cones, tolerance);
-  // A proxy that was in the corner and sticks there is returned bit for bit.
+  // A proxy that was in the corner and sticks there is returned unchanged, bit for bit.
   const Vec3& q = contacts[0].q;
   out.r = at_rest && in_place && q == contacts[1].q && q == contacts[2].q ? q : corner.x0;
   return out;

@@ -1,10 +1,10 @@
-// Dry friction everywhere in space, equation (3): the proxy moves only against a force F.
+// Renders dry friction everywhere in space, equation (3): the proxy moves only if a force greater than F acts on it.
 //
 //   𝒢(K, p, q) = q                                  if ‖p − q‖ ≤ F/K
 //                p − (F/K) (p − q)/‖p − q‖          if ‖p − q‖ > F/K        (3)
 //
-// F > 0 in N is both the kinetic and the greatest static friction force. ℳ is (16). With (23) or (26) this gives the
-// friction model of the paper's reference [14].
+// F > 0 (N) is both the kinetic friction force and the greatest static friction force. ℳ is (16). With (23) or (26),
+// (3) gives the friction model of the paper's reference [14].
 #pragma once
 
 #include <cmath>
@@ -27,7 +27,7 @@ class CoulombField final : public GeometricAlgorithm<N> {
   Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
     const Vec<N> d = p - q;
     const double distance = d.norm(), reach = F_ / K;
-    // Written as "not greater", so that a distance whose square underflows sticks.
+    // The condition is "not greater", so that the proxy sticks if the square of the distance underflows.
     if (!(distance > reach)) return q;  // (3), first case: q itself, bit for bit
     return p - (reach / distance) * d;  // (3), second case
   }

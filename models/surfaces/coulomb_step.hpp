@@ -1,11 +1,14 @@
-// One step in a Coulomb medium of force F, over any 𝒢' that renders the rest of the world.
+// One step in a medium with Coulomb friction of force F, beside any 𝒢' that renders the rest of the world.
 //
-// The medium adds −F (r − q)/‖r − q‖ (16) to ℳ. For a moving proxy this equals a viscous medium with the unknown
-// λ = F/‖r − q‖ in place of b/T (media.hpp). With τ = λ/(κ + λ), 0 ≤ τ < 1, the step and the condition for τ are
-//   r(τ) = 𝒢'(κ/(1 − τ), p + τ (q − p), q),   κ τ/(1 − τ) ‖r(τ) − q‖ = F.
-// If 𝒢' is free or slides on a plane, the condition's left side is linear in τ, and (3) is its solution. The proxy
-// sticks if κ ‖R‖ ≤ F, where R = lim (r(τ) − q)/(1 − τ) for τ → 1 is extrapolated. Otherwise the condition is solved by
-// the secant method for short slips and by false position (the Illinois variant) for others.
+// The step is derived as follows:
+// 1. The medium adds −F (r − q)/‖r − q‖ (16) to ℳ.
+// 2. For a moving proxy, the medium equals a viscous medium (media.hpp) whose b/T is the unknown λ = F/‖r − q‖.
+// 3. With τ = λ/(κ + λ), 0 ≤ τ < 1, the step and the condition for τ are
+//      r(τ) = 𝒢'(κ/(1 − τ), p + τ (q − p), q),   κ τ/(1 − τ) ‖r(τ) − q‖ = F.
+// 4. If 𝒢' is free or slides on a plane, the left side of the condition is linear in τ, and (3) is the solution.
+// 5. The proxy sticks if κ ‖R‖ ≤ F, where R is the limit of (r(τ) − q)/(1 − τ) for τ → 1, found by extrapolation.
+// 6. Otherwise the code solves the condition for τ: by the secant method for short slips, and by false position (the
+//    Illinois variant) for longer slips.
 #pragma once
 
 #include <algorithm>
@@ -24,8 +27,8 @@ class CoulombStep {
   CoulombStep(GeometricAlgorithm<N>& rest, double kappa, double force_N, const Vec<N>& p, const Vec<N>& q) noexcept
       : rest_(rest), kappa_(kappa), F_(force_N), p_(p), q_(q), d_(q - p), size_(d_.norm()) {}
 
-  // Returns r; rest.contacts() are then its contacts. `found` becomes false if no τ gives F. The medium then takes more
-  // or less than F, and r is the sample at which the search for τ ended.
+  // Returns r; rest.contacts() are then the contacts at r. `found` becomes false if no τ satisfies the condition. The
+  // medium's force then differs from F, and r is the sample at which the search for τ ended.
   Vec<N> solve(bool& found) noexcept {
     found = true;
     if (Vec<N> free; goes_free(0, 0, free)) return free;
@@ -44,7 +47,8 @@ class CoulombStep {
         if (slip(F_ / pull, pull, r)) return r;
       }
       // The proxy can't rest at q: q is behind a surface (possible at order 2), or an object carries the proxy away.
-      // Then r(τ) doesn't end in q, and the medium's force grows without bound, so a bracket exists.
+      // Then r(τ) doesn't end in q for τ → 1, so the medium's force grows without bound, and a sample with more than F
+      // exists.
       while (high.excess < 0.0 && 1.0 - high.tau > 1e-15) {
         low = high;
         high = at(1.0 - 0.1 * (1.0 - high.tau));
@@ -56,27 +60,29 @@ class CoulombStep {
 
  private:
   struct Sample {
-    double tau = 0.0, excess = 0.0;  // excess: the medium's force at τ minus F, N
+    double tau = 0.0, excess = 0.0;  // excess: the medium's force at τ minus F, in N
     Vec<N> r;
   };
 
   Sample at(double tau) noexcept {
-    const Vec<N> aim = tau < 0.5 ? Vec<N>(p_ + tau * d_) : Vec<N>(q_ - (1.0 - tau) * d_);  // the nearer end rounds less
+    // Starts from p or q, whichever is nearer, because the result then has the smaller rounding error.
+    const Vec<N> aim = tau < 0.5 ? Vec<N>(p_ + tau * d_) : Vec<N>(q_ - (1.0 - tau) * d_);
     Sample sample{tau, 0.0, rest_(kappa_ / (1.0 - tau), aim, q_)};
     sample.excess = kappa_ * tau / (1.0 - tau) * (sample.r - q_).norm() - F_;
     return sample;
   }
 
-  // The error in the medium's force (N) that rounding of r and of p + τ (q − p) can cause.
+  // Returns the error of the medium's force (N) that the rounding of r and of p + τ (q − p) can cause.
   [[nodiscard]] double rounding_N(const Vec<N>& r) const noexcept {
     const double places = 16.0 * u * (r.template lpNorm<1>() + q_.template lpNorm<1>());
     return F_ * places / (r - q_).norm() + kappa_ * (places + 16.0 * u * p_.template lpNorm<1>());
   }
 
-  // (3), second case: the proxy ends without contact. Tries the exact end (attempt 0) and ends some units in the last
-  // place beside it: past the middle of a ball, 𝒢' may find one point free and its neighbour blocked.
+  // Tries (3), second case: the proxy ends without contact. Attempt 0 uses the exact end point of the motion. Attempts
+  // 1 to 8 use points some units in the last place beside the end point. They are necessary if p is beyond the middle
+  // of a ball: 𝒢' may then find a point blocked although the neighbouring point is free.
   bool goes_free(int first, int last, Vec<N>& r) noexcept {
-    const double share = (kappa_ * size_ - F_) / (kappa_ * size_);  // fraction of the way from q to p; NaN for p = q
+    const double share = (kappa_ * size_ - F_) / (kappa_ * size_);  // fraction of the path from q to p; NaN for p = q
     if (!(share > 0.0)) return false;
     for (int k = first; k <= last; ++k) {
       const int units = k % 2 == 0 ? -2 * k : 2 * (k + 1);
@@ -88,18 +94,19 @@ class CoulombStep {
     return false;
   }
 
-  // Whether the rest of the world leaves a proxy at q, within the rounding of q. The huge stiffness keeps elastic
-  // layers from moving the proxy.
+  // Whether a proxy at q stays at q in the rest of the world, within the rounding of q. The stiffness is huge, so that
+  // elastic layers don't move the proxy.
   bool q_is_place() noexcept {
     return (rest_(1e15 * kappa_, q_, q_) - q_).norm() <= 32.0 * u * q_.template lpNorm<1>();
   }
 
-  // Near rest (τ → 1) the slip is short and the world is flat: r(τ) = q + (1 − τ) R. Extrapolates R to 1 − τ = 0 by
-  // Neville's scheme, quartering 1 − τ with each sample until R changes by no more than the rounding of r. `high`
-  // becomes the last sample. Returns true if the world is flat from the first sample on.
+  // Extrapolates R to 1 − τ = 0 by Neville's scheme. Near rest (τ → 1) the slip is so short that the world is flat, and
+  // r(τ) = q + (1 − τ) R. Each sample has a quarter of the last sample's 1 − τ, until R changes by no more than the
+  // rounding of r. `high` becomes the last sample. Returns true if the world is flat from the first sample on.
   bool extrapolate(Vec<N>& R, Sample& high) noexcept {
     constexpr int most = 14;
-    std::array<Vec<N>, most> row;  // by degree: polynomials through the last samples, at 1 − τ = 0
+    // row[d] is the value at 1 − τ = 0 of the polynomial of degree d through the last samples.
+    std::array<Vec<N>, most> row;
     row[0] = R;
     Sample sample = high;
     double least = std::numeric_limits<double>::infinity();
@@ -120,7 +127,8 @@ class CoulombStep {
       const double change = (row[k] - last).norm();
       if (change > least && least <= 100.0 * rounding) break;
       least = change;
-      // If the last two agree within rounding, the one before is as good and has a quarter of the rounding error.
+      // If the last two values agree within rounding, the earlier value is taken, because the later value has four
+      // times as much rounding error.
       R = change <= 0.5 * rounding ? last : row[k];
       high = sample;
       if (change <= rounding) break;
@@ -128,8 +136,8 @@ class CoulombStep {
     return false;
   }
 
-  // Tries a slip so short that r(τ) ≈ q + (1 − τ) R: the secant method, from the τ at which this form gives F. Returns
-  // false if it doesn't converge.
+  // Tries a slip so short that r(τ) ≈ q + (1 − τ) R. Starts at the τ at which this approximation gives F, and goes on
+  // by the secant method. Returns false if the method doesn't converge.
   bool slip(double tau, double pull, Vec<N>& r) noexcept {
     Sample sample = at(tau);
     double slope = pull;
@@ -145,15 +153,15 @@ class CoulombStep {
     return std::abs(sample.excess) <= rounding_N(sample.r);
   }
 
-  // Evaluates 𝒢' once more so that rest.contacts() are the contacts at q: as near to q as rounding allows or, without
-  // contacts there, at the first sample's τ.
+  // Evaluates 𝒢' once more, so that rest.contacts() are the contacts at q. The evaluated sample is as near to q as
+  // rounding allows. If it has no contacts, the sample at τ = held_at is evaluated.
   void touch_at_rest() noexcept {
     at(1.0 - std::min(1e6 * u * (p_.template lpNorm<1>() + q_.template lpNorm<1>()) / size_, 1.0 - held_at));
     if (rest_.contacts().empty()) at(held_at);
   }
 
-  // False position (the Illinois variant) with a bisection every eighth step. Precondition: low.excess < 0 <
-  // high.excess.
+  // Searches by false position (the Illinois variant), with a bisection every eighth step. Precondition: low.excess < 0
+  // < high.excess.
   bool search(Sample low, Sample high) noexcept {
     double e_low = low.excess, e_high = high.excess;
     double tau = F_ / (kappa_ * size_);
@@ -172,8 +180,9 @@ class CoulombStep {
     return std::abs(last_.excess) <= rounding_N(last_.r);
   }
 
-  // If 𝒢' has several solutions (a push straight through a ball's middle, two faces of a box), r(τ) jumps between them,
-  // and F may lie within a jump. Each solution by itself is smooth in τ; its contacts identify it.
+  // One solution of 𝒢', if 𝒢' has several (for a push straight through a ball's middle, or at two faces of a box). r(τ)
+  // then jumps between the solutions, and the τ that gives F may lie at a jump. Each solution by itself is smooth in τ.
+  // Its contacts identify it.
   struct Answer {
     std::uint64_t touches = 0;
     Sample low{.tau = -1.0, .excess = 0.0, .r = {}}, high{.tau = 2.0, .excess = 0.0, .r = {}};
@@ -217,8 +226,8 @@ class CoulombStep {
     return false;
   }
 
-  // Uses the secant method while samples stay with this solution, otherwise points that the golden ratio spreads evenly
-  // over the bracket.
+  // Uses the secant method while samples belong to this solution. Otherwise samples points that the golden ratio
+  // spreads evenly over the bracket.
   bool search_within(Answer& answer) noexcept {
     constexpr double golden = 0.6180339887498949;
     bool same = true;
@@ -235,7 +244,8 @@ class CoulombStep {
     return false;
   }
 
-  // τ of the first sample near rest, 4 % of the way to p: near enough for most worlds to be flat, far above rounding.
+  // τ of the first sample near rest, whose aim is at 4 % of the path from q to p. This is near enough to q that most
+  // worlds are flat, and far above rounding.
   static constexpr double held_at = 0.96;
   static constexpr double close_enough = 1e-14;
   static constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
@@ -245,7 +255,7 @@ class CoulombStep {
   const Vec<N>&p_, &q_;
   Vec<N> d_;
   double size_;
-  Sample last_{};  // the last sample of a search
+  Sample last_{};  // the last sample that a search evaluated
 };
 
 }  // namespace proxarm::models

@@ -1,7 +1,8 @@
-// A flat surface through any point of space, and the rounding errors of its heights.
+// Defines a flat surface through any point of space, and the rounding error of a point's height above the surface.
 //
-// The paper's surface contains the origin. Here heights are relative to `point`, so that a surface a kilometre away
-// loses only what its coordinates can't hold. The normal has length one within rounding and points to the free side.
+// The paper's surface contains the origin. Here heights are relative to `point`, so a surface a kilometre away loses no
+// more accuracy than the rounding of its coordinates. The normal has length one within rounding and points to the free
+// side.
 #pragma once
 
 #include <cmath>
@@ -12,7 +13,7 @@
 
 namespace proxarm::models {
 
-// v scaled to length one, without under- or overflow. Throws std::invalid_argument if v is zero or not finite.
+// Returns v scaled to length one, without under- or overflow. Throws std::invalid_argument if v is zero or not finite.
 template <int N>
 Vec<N> unit(const Vec<N>& v) {
   const double largest = v.cwiseAbs().maxCoeff();
@@ -24,14 +25,14 @@ Vec<N> unit(const Vec<N>& v) {
 template <int N>
 class FlatSurface {
  public:
-  // point in metres; normal of any length but zero. Throws std::invalid_argument for other values.
+  // `point_m` is finite; `normal` has any finite length but zero. Throws std::invalid_argument for other values.
   FlatSurface(const Vec<N>& point_m, const Vec<N>& normal)
       : point_(point_m), normal_(unit<N>(normal)), point_size_(point_m.template lpNorm<1>()) {
     if (!point_m.allFinite()) throw std::invalid_argument("a surface needs a finite point");
   }
 
-  // A surface from a normal of length one, for tangent planes within a step. Precondition: both arguments are finite,
-  // and the normal's length is one within rounding.
+  // Returns a surface from a normal of length one, for tangent planes within a step. Precondition: both arguments are
+  // finite, and the normal's length is one within rounding.
   static FlatSurface of_unit(const Vec<N>& point_m, const Vec<N>& unit_normal) noexcept {
     FlatSurface surface;
     surface.point_ = point_m;
@@ -43,24 +44,26 @@ class FlatSurface {
   [[nodiscard]] const Vec<N>& point() const noexcept { return point_; }
   [[nodiscard]] const Vec<N>& normal() const noexcept { return normal_; }
 
-  // nᵀ(x − point) in metres, positive on the free side: the paper's nᵀx if point is the origin.
+  // Returns nᵀ(x − point) in metres, positive on the free side. This is the paper's nᵀx if `point` is the origin.
   [[nodiscard]] double height(const Vec<N>& x) const noexcept { return normal_.dot(x - point_); }
 
-  // The orthogonal projection onto the surface, x − n nᵀ(x − point).
+  // Returns the orthogonal projection of x onto the surface, x − n nᵀ(x − point).
   [[nodiscard]] Vec<N> projection(const Vec<N>& x) const noexcept { return x - normal_ * height(x); }
 
-  // The height (m) below which rounding can't tell a point from one on the surface.
+  // Returns a height (m) below which rounding makes a point indistinguishable from a point on the surface.
   //
-  // With u = 2⁻⁵³, the computed height of a point meant to be on the surface has an error of at most u ‖x‖
-  // (coordinates) + u ‖x − point‖ (difference) + (N + 1) u ‖x − point‖ (sum), for N ≤ 3 at most 6 u (‖x‖₁ + ‖point‖₁).
-  // One more unit covers second-order terms and ‖n‖ = 1 + O(u). The function returns more than twice that, 16 u: about
-  // 2e-15 m within a metre of the origin.
+  // Derivation, with u = 2⁻⁵³ and N ≤ 3, for a point x that is meant to be on the surface:
+  // 1. The computed height has an error of u ‖x‖ from the coordinates, u ‖x − point‖ from the difference x − point, and
+  //    (N + 1) u ‖x − point‖ from the sum: together at most 6 u (‖x‖₁ + ‖point‖₁).
+  // 2. One more u (‖x‖₁ + ‖point‖₁) covers second-order terms and ‖n‖ = 1 + O(u).
+  // 3. The function returns more than twice this sum: 16 u (‖x‖₁ + ‖point‖₁). Within a metre of the origin this is
+  //    about 2e-15 m.
   [[nodiscard]] double rounding(const Vec<N>& x) const noexcept {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
     return 16.0 * u * (x.template lpNorm<1>() + point_size_);
   }
 
-  // ‖point‖₁: the size of the point's coordinates.
+  // Returns ‖point‖₁, the size of the point's coordinates.
   [[nodiscard]] double size() const noexcept { return point_size_; }
 
   [[nodiscard]] bool holds(const Vec<N>& x) const noexcept { return std::abs(height(x)) <= rounding(x); }

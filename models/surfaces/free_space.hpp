@@ -1,4 +1,4 @@
-// An empty world: the proxy goes where it is asked to go.
+// Renders an empty world: the proxy goes to p.
 //
 //   𝒢(K, p, q) = p,   ℳ(q, q̇) = o
 #pragma once

@@ -1,4 +1,4 @@
-// A flat wall with Coulomb friction, equation (4).
+// Renders a flat wall with Coulomb friction, equation (4).
 //
 //   𝒢(K, p, q) = p                                                   if nᵀp > 0
 //                q_sf                                                if nᵀp ≤ 0 ∧ ‖p_sf − q_sf‖ ≤ −μ nᵀp
@@ -6,9 +6,9 @@
 //
 //   p_sf = p − n nᵀp,   q_sf = q − n nᵀq
 //
-// p and q are relative to a point of the surface. ℳ is (17). K does not appear, because penetration and friction's
-// reach are both forces over K. A proxy that is on the surface (within rounding) and sticks is returned bit for bit, so
-// that it never creeps.
+// p and q are relative to a point of the surface. ℳ is (17). K doesn't appear, because penetration and the reach of
+// friction are both forces divided by K. A proxy that is on the surface (within rounding) and sticks is returned
+// unchanged, bit for bit, so that it never creeps.
 #pragma once
 
 #include <cmath>
@@ -19,10 +19,10 @@
 
 namespace proxarm::models {
 
-// One step on one surface.
+// The result of a step on one surface.
 template <int N>
 struct FaceStep {
-  Vec<N> r;  // p itself without contact
+  Vec<N> r;  // p itself if the proxy doesn't touch the surface
   bool touches = false;
   bool slips = false;
 };
@@ -30,9 +30,10 @@ struct FaceStep {
 template <int N>
 FaceStep<N> step_on_face(const FlatSurface<N>& surface, double mu, const Vec<N>& p, const Vec<N>& q) noexcept {
   const Vec<N>& n = surface.normal();
-  const double n_p = surface.height(p);                         // nᵀp
-  if (n_p > 0.0) return {p, false, false};                      // (4), first case
-  if constexpr (N == 1) return {surface.point(), true, false};  // no tangent to slip along: the surface is a point
+  const double n_p = surface.height(p);     // nᵀp
+  if (n_p > 0.0) return {p, false, false};  // (4), first case
+  // The surface is a point, so the proxy can't slip.
+  if constexpr (N == 1) return {surface.point(), true, false};
 
   const Vec<N> p_sf = p - n * n_p;
   const double n_q = surface.height(q);
@@ -40,13 +41,13 @@ FaceStep<N> step_on_face(const FlatSurface<N>& surface, double mu, const Vec<N>&
   const Vec<N> q_sf = on_surface ? q : Vec<N>(q - n * n_q);
   const Vec<N> d = p_sf - q_sf;
   const double distance2 = d.squaredNorm(), reach = -mu * n_p;
-  // Written as "not greater", so that a distance whose square underflows sticks, and no step divides by zero.
+  // The condition is "not greater", so that the proxy sticks if distance2 underflows, and no step divides by zero.
   if (!(distance2 > reach * reach))
     return {on_surface ? q : surface.projection(q_sf), true, false};  // (4), second case
 
   const Vec<N> r = p_sf - (reach / std::sqrt(distance2)) * d;  // (4), third case
-  // If p is deeper than the scene is wide, the rounding of n_p leaves r off the surface; a second projection corrects
-  // that.
+  // If p is deeper than the scene is wide, the rounding of n_p leaves r off the surface; a second projection puts r
+  // onto it.
   if (-n_p > 1e-3 + surface.size() + q.template lpNorm<1>()) return {surface.projection(r), true, mu > 0.0};
   return {r, true, mu > 0.0};
 }
@@ -54,8 +55,8 @@ FaceStep<N> step_on_face(const FlatSurface<N>& surface, double mu, const Vec<N>&
 template <int N>
 class FrictionPlane final : public GeometricAlgorithm<N> {
  public:
-  // Throws std::invalid_argument for a normal without a direction or a friction coefficient that isn't finite and ≥ 0.
-  // μ = 0 gives (2); Plane is cheaper then.
+  // Throws std::invalid_argument if the normal has no direction, or if the friction coefficient isn't finite or is
+  // negative. For μ = 0, (4) equals (2); Plane is then cheaper.
   FrictionPlane(const Vec<N>& point_m, const Vec<N>& normal, double friction)
       : surface_(point_m, normal), mu_(friction) {
     if (!std::isfinite(friction) || !(friction >= 0.0)) {
@@ -78,7 +79,7 @@ class FrictionPlane final : public GeometricAlgorithm<N> {
 
   [[nodiscard]] const FlatSurface<N>& surface() const noexcept { return surface_; }
   [[nodiscard]] double friction() const noexcept { return mu_; }
-  // Takes effect with the next step. Precondition: finite and not negative.
+  // Sets μ from the next step on. Precondition: `friction` is finite and not negative.
   void set_friction(double friction) noexcept { mu_ = friction; }
 
  private:

@@ -6,7 +6,7 @@
 namespace proxarm::models {
 namespace {
 
-// The 2 × 2 system across e, in coordinates (n₁, t₁), as a function of s.
+// The 2 × 2 linear system for f₁ and f₂ as a function of s (groove.hpp), in the coordinates (n₁, t₁) across e.
 struct CrossSection {
   double cos, sin;  // n₂ = (cos, sin), t₂ = (−sin, cos)
   double F_n, F_t;  // x₀ − p
@@ -14,12 +14,13 @@ struct CrossSection {
   double mu[2], s_q[2], w[2];
 
   struct Shares {
-    double f[2];  // normal forces over K
-    double g;     // the balance of forces along e: zero at the solution
+    double f[2];  // normal forces divided by K
+    // The balance of forces along e; zero at the solution.
+    double g;
   };
 
-  // f and g at s, with friction only at the contacts in `mask` (bit i). A contact at rest (v_i = 0) has no friction
-  // here.
+  // Returns f and g at s, with friction only at the contacts in `mask` (bit i: contact i). Here a contact at rest (v_i
+  // = 0) has no friction.
   Shares at(double s, int mask = 3) const noexcept {
     double A[2][2] = {{1.0, 0.0}, {cos, sin}};
     double along[2] = {0.0, 0.0};
@@ -39,17 +40,18 @@ struct CrossSection {
     return out;
   }
 
-  // The first guess: the root for w = 0, in closed form.
+  // Returns a first guess of the root of g: the root for w = 0, in closed form.
   [[nodiscard]] double guess() const noexcept {
     const double f_2 = F_t / sin, f_1 = F_n - cos * f_2;
     return s_p - std::copysign(mu[0] * f_1 + mu[1] * f_2, s_p - s_q[0]);
   }
 
-  // Whether g vanishes at s within rounding. A sign change may also be a pole of g; beside a pole g is large.
+  // Whether g is zero at s within rounding. Where the sign of g changes, g may also have a pole, but near a pole |g| is
+  // large.
   //
-  // Friction of contact i reverses within about w_i of s_i. So g's slope is up to μ_i f_i/|w_i| there (5e3 for a q 0.3
-  // nm beside the line, pressed 6 µm deep), and g vanishes only to this slope times the rounding of s. Shares are
-  // capped at the force without friction, so that a pole doesn't pass for a root.
+  // The friction of contact i reverses its direction within a distance of about w_i from s_i. There, g has a slope of
+  // up to μ_i f_i/|w_i| (5e3 if q is 0.3 nm beside the line and p is 6 µm deep), so g is zero only within this slope
+  // times the rounding of s. The code limits f_i to the force without friction, so that a pole isn't taken for a root.
   [[nodiscard]] bool is_root(double s, const Shares& shares) const noexcept {
     constexpr double eps = std::numeric_limits<double>::epsilon();
     const double force = std::abs(F_n) + std::abs(F_t), s_size = std::abs(s) + std::abs(s_p) + std::abs(s_q[0]);
@@ -61,9 +63,9 @@ struct CrossSection {
   }
 };
 
-// The root of g between lo and hi. Precondition: g(lo) ≤ 0 ≤ g(hi). Usually g is nearly linear around the closed form's
-// solution, and the secant method takes a few steps. If it fails, false position (the Illinois variant) follows, with a
-// bisection every fourth step.
+// Returns the root of g between lo and hi. Precondition: g(lo) ≤ 0 ≤ g(hi). Usually g is nearly linear around guess(),
+// and the secant method needs a few steps. If the secant method fails, false position (the Illinois variant) follows,
+// with a bisection every fourth step.
 double root(const CrossSection& c, double lo, double hi) noexcept {
   const double small = 2.0 * std::numeric_limits<double>::epsilon() * (std::abs(c.s_p) + std::abs(c.s_q[0]));
   double at = std::clamp(c.guess(), lo, hi), g_at = c.at(at).g, next = std::clamp(at - g_at, lo, hi);
@@ -105,7 +107,7 @@ double root(const CrossSection& c, double lo, double hi) noexcept {
   return 0.5 * (lo + hi);
 }
 
-// One call of solve_groove: both contacts in coordinates along e (s) and across it (w), relative to x₀.
+// One call of solve_groove. Contains both contacts in coordinates along e (s) and across e (w), relative to x₀.
 class Groove {
  public:
   Groove(const PlaneContact& a, const PlaneContact& b, const GrooveLine& line, const Vec3& p,
@@ -120,7 +122,7 @@ class Groove {
     s_q_ = {line.e.dot(d_1), line.e.dot(d_2)};
     w_ = {-line.t1.dot(d_1), -line.t2.dot(d_2)};
     for (double& w : w_) w = std::abs(w) <= w_rounding_ ? 0.0 : w;
-    // The rounding of p may make a normal force (over K) slightly negative; such a contact still touches.
+    // The rounding of p may make a normal force (over K) slightly negative. A contact with such a force still touches.
     least_ = may_pull() ? -std::numeric_limits<double>::infinity() : -w_rounding_;
     f_2_ = F_t_ / line.sin;
     f_1_ = F_n_ - line.cos * f_2_;
@@ -130,7 +132,7 @@ class Groove {
     if (w_[0] == 0.0 && w_[1] == 0.0 && s_q_[0] == s_q_[1]) {
       from_within();
     } else if (may_pull() && (f_1_ < 0.0 || f_2_ < 0.0)) {
-      // The friction of a contact that pulls is meaningless.
+      // For a contact that pulls, friction has no meaning.
       out_.found = true;
       out_.r = place(s_p_);
     } else {
@@ -145,13 +147,14 @@ class Groove {
     return line_.settle(a_.surface, b_.surface, line_.x0 + s * line_.e);
   }
 
-  // The proxy was already in the line: the closed form applies.
+  // Solves the case that the proxy was already in the line; the solution is in closed form.
   void from_within() noexcept {
     if (f_1_ < least_ || f_2_ < least_) return;
     out_.found = true;
     const double reach = a_.mu * std::max(0.0, f_1_) + b_.mu * std::max(0.0, f_2_), d = s_p_ - s_q_[0];
     if (std::abs(d) <= reach) {
-      out_.r = a_.surface.holds(a_.q) && b_.surface.holds(a_.q) ? a_.q : place(s_q_[0]);  // sticks: q itself
+      // If the proxy sticks, it stays at q itself.
+      out_.r = a_.surface.holds(a_.q) && b_.surface.holds(a_.q) ? a_.q : place(s_q_[0]);
       return;
     }
     out_.slips1 = a_.mu > 0.0;
@@ -159,7 +162,7 @@ class Groove {
     out_.r = place(s_p_ - std::copysign(reach, d));
   }
 
-  // The proxy arrives in the line from beside it: the root of g.
+  // Solves the case that the proxy arrives in the line from beside it; the solution is the root of g.
   void from_beside() noexcept {
     const CrossSection c{line_.cos, line_.sin, F_n_, F_t_, s_p_, {a_.mu, b_.mu}, {s_q_[0], s_q_[1]}, {w_[0], w_[1]}};
     double lo = std::min({s_p_, s_q_[0], s_q_[1]}), hi = std::max({s_p_, s_q_[0], s_q_[1]});
@@ -172,9 +175,10 @@ class Groove {
     look_for_another_root(c, is_root);
   }
 
-  // A contact with w = 0 need not slip across the line, so it may stick while the other slips. Returns true if one
-  // sticks: the solution is then accepted, or none exists because a contact pulls. Otherwise narrows lo and hi to the
-  // side of the root, to which that contact is pushed.
+  // Whether a contact sticks while the other contact slips. This is possible for a contact with w = 0, because it
+  // needn't slip across the line. If the function returns true, either the solution was accepted, or no solution exists
+  // because a contact pulls. If it returns false, lo and hi have been narrowed to the side of s_i to which contact i is
+  // pushed, because the root is on this side.
   bool one_sticks(const CrossSection& c, double& lo, double& hi) noexcept {
     for (int i = 0; i < 2; ++i) {
       if (c.w[i] != 0.0 || !(c.mu[i] > 0.0) || c.s_q[i] < lo || c.s_q[i] > hi) continue;
@@ -193,10 +197,11 @@ class Groove {
     return false;
   }
 
-  // If p is far deeper than q was away, friction across the line can make the 2 × 2 system singular: g then has several
-  // roots, or poles between them. Searches from s_p towards s_1, in intervals that end 0.7 times as far from s_1 as
-  // they begin. After a first root at which a contact pulls, the search begins 1000 w from s_1: farther away all slips
-  // are practically along e, and g has no further root.
+  // Searches for another root of g. If p is far deeper than q was away from the line, friction across the line can make
+  // the 2 × 2 system singular; g then has several roots, or poles between the roots. The search goes from s_p towards
+  // s_1 in intervals; each interval ends at 0.7 times the distance from s_1 at which it begins. If a contact pulls at
+  // the first root, the search begins at a distance of 1000 w from s_1: at greater distances the contacts slip
+  // practically along e, and g has no further root.
   void look_for_another_root(const CrossSection& c, bool first_was_root) noexcept {
     const double widest = std::max(std::abs(c.w[0]), std::abs(c.w[1])), way = std::abs(s_p_ - s_q_[0]);
     double at = first_was_root ? std::min(1.0, 1e3 * widest / way) : 1.0;
@@ -222,10 +227,14 @@ class Groove {
   const PlaneContact &a_, &b_;
   const GrooveLine& line_;
   GrooveSearch search_;
-  double rounding_, w_rounding_;   // w_rounding: largest |w| of a proxy that is in the line
-  double s_p_, F_n_, F_t_;         // p along e, and x₀ − p across it
-  std::array<double, 2> s_q_, w_;  // q of each contact along e and across it; |w| within rounding is set to 0
-  double least_, f_1_, f_2_;       // least normal force allowed; normal forces without friction
+  // rounding_: sum of the heights' rounding. w_rounding_: largest |w| of a proxy that counts as in the line.
+  double rounding_, w_rounding_;
+  // s_p_: p along e. F_n_, F_t_: x₀ − p across e, along n₁ and t₁.
+  double s_p_, F_n_, F_t_;
+  // Each contact's q along e (s) and across e (w). A |w| within rounding is set to 0.
+  std::array<double, 2> s_q_, w_;
+  // least_: least normal force that is allowed. f_1_, f_2_: normal forces without friction.
+  double least_, f_1_, f_2_;
   GrooveSolution out_;
 };
 

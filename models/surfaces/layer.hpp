@@ -1,4 +1,5 @@
-// An elastic layer on a surface: it yields by force over stiffness k, down to its rigid core.
+// Renders an elastic layer on a flat surface: the layer yields by the normal force divided by its stiffness k, down to
+// a rigid core.
 //
 //   K (h − h_p) = −k h        along the normal; h and h_p are the heights of r and p; −h ≤ the layer's thickness
 //   (4) along the tangent     with the normal force K (h − h_p)
@@ -14,13 +15,13 @@
 namespace proxarm::models {
 
 struct Layer {
-  double stiffness_N_per_m = std::numeric_limits<double>::infinity();  // infinite: no layer
+  double stiffness_N_per_m = std::numeric_limits<double>::infinity();  // infinite: there is no layer
   double thickness_m = 0.0;
 
   [[nodiscard]] bool soft() const noexcept { return thickness_m > 0.0; }
 };
 
-// One step on a flat surface with a layer, or without one.
+// Makes one step on a flat surface with or without a layer.
 inline FaceStep<3> step_on_layer(const FlatSurface<3>& surface, double mu, const Layer& layer, double K, const Vec3& p,
                                  const Vec3& q) noexcept {
   if (!layer.soft()) return step_on_face(surface, mu, p, q);

@@ -1,6 +1,7 @@
-// Renders a world of one or two dimensions with a 𝒢 of three: the missing coordinates stay zero.
+// Renders a world of one or two dimensions with a 𝒢 of three dimensions; the added coordinates stay zero.
 //
-// Precondition: all surface normals of that 𝒢 lie in the first N dimensions, so that all forces do.
+// Precondition: all surface normals of the 𝒢 of three dimensions lie in the first N dimensions. Then all its forces lie
+// in these dimensions, too.
 #pragma once
 
 #include <array>

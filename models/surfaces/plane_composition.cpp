@@ -7,14 +7,14 @@ namespace proxarm::models {
 namespace {
 
 constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
-// For up to this many faces, all lines (32² of 160 bytes: 160 kB) and corners (8³ of 104 bytes: 53 kB) are computed in
-// advance; larger tables would outgrow the processor's cache.
+// Up to these numbers of faces, the constructor computes all lines (32² of 160 bytes: 160 kB) and all corners (8³ of
+// 104 bytes: 53 kB). Larger tables would be larger than the processor's cache.
 constexpr std::size_t stored_lines = 32;
 constexpr std::size_t stored_corners = 8;
 
 }  // namespace
 
-// The faces that may be part of the solution: those that p is behind, and those that a trial ran into.
+// The faces that may be part of the solution: faces that p is behind, and faces that a trial ran into.
 struct PlaneComposition::Candidates {
   static constexpr std::size_t most = 12;
   std::array<std::size_t, most> index;
@@ -79,11 +79,11 @@ bool PlaneComposition::fits(const Vec3& q, const Vec3& r, const std::array<std::
     if (m == contacts[0] || m == contacts[1] || m == contacts[2]) continue;
     const FlatSurface<3>& surface = faces_[m].surface;
     const double height = surface.height(r);
-    // A height within rounding counts as on the face. But a proxy that slips on a single face must not end lower over
-    // another face than q was: if both hold it at rest, it would creep along the first by less than rounding in each
-    // step.
+    // A proxy whose height is within rounding counts as on the face. There is one exception: a proxy that slips on a
+    // single face must not end lower over another face than q was. Otherwise, if both faces hold the proxy at rest, it
+    // would creep along the first face by less than rounding in each step.
     if (height < 0.0 && (height < -surface.rounding(r) || (creeps && height < surface.height(q)))) {
-      if (candidates.count == faces_.size()) return false;  // all faces are candidates already
+      if (candidates.count == faces_.size()) return false;  // all faces are already candidates
       candidates.add(m);
       fits = false;
     }
@@ -160,7 +160,7 @@ Vec3 PlaneComposition::operator()(double /*K*/, const Vec3& p, const Vec3& q) no
   if (candidates.count == 0) return p;
   Choice choice;
   if (!search(p, q, candidates, choice)) {
-    // Gives friction up: without friction a solution always exists, the point of the convex free space nearest to p.
+    // Leaves friction out. Without friction a solution always exists: the point of the convex free space nearest to p.
     ++without_friction_;
     candidates.friction = false;
     if (!search(p, q, candidates, choice)) return q;

@@ -1,12 +1,13 @@
-// Several flat surfaces at once: corners, grooves, wedges, boxes seen from inside, with friction on each side.
+// Renders several flat surfaces at once, with friction on each: corners, grooves, wedges, boxes seen from inside.
 //
-// The free space in front of all faces is convex. A step's solution is a set of at most three contacts and the point
-// that they hold. The search (contact_search.hpp) tries sets until one is complete: no contact pulls, nothing is
-// penetrated, and each contact's friction obeys (17). Fewer contacts come first, then the smallest ‖r − p‖. If
-// Coulomb's law has several solutions (grooves sharper than 2 atan μ can jam), this rule chooses one.
+// The free space in front of all faces is convex. The solution of a step is a set of at most three contacts and the
+// point that these contacts hold. The search (contact_search.hpp) tries sets until one set is complete: no contact
+// pulls, the proxy penetrates no face, and each contact's friction obeys (17). Smaller sets are tried first. Among sets
+// of one size, the set with the smallest ‖r − p‖ is chosen; this rule also chooses if Coulomb's law has several
+// solutions (grooves sharper than 2 atan μ can jam).
 //   one contact     (4), exactly
-//   two             solve_groove
-//   three           the corner itself, if the three friction cones together can bear the force
+//   two contacts    solve_groove
+//   three contacts  the corner itself, if the sum of the three friction cones contains the force
 // K doesn't appear, and the result doesn't depend on earlier steps.
 #pragma once
 
@@ -24,7 +25,7 @@ namespace proxarm::models {
 
 class PlaneComposition final : public GeometricAlgorithm<3> {
  public:
-  // Faces become objects 0, 1, … in this order. Throws std::invalid_argument for a μ that isn't finite and ≥ 0.
+  // The faces become objects 0, 1, … in this order. Throws std::invalid_argument if a μ isn't finite or is negative.
   explicit PlaneComposition(std::vector<Face> faces);
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
@@ -32,11 +33,12 @@ class PlaneComposition final : public GeometricAlgorithm<3> {
 
   [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
 
-  // Steps so far in which no set of contacts was complete and friction was left out. Zero unless faces meet at less
-  // than 2 atan μ.
+  // Returns the number of steps so far in which no set of contacts was complete, so that friction was left out. This
+  // number is zero unless faces meet at an angle of less than 2 atan μ.
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return without_friction_; }
 
-  // Sets the friction of all faces of an object, from the next step on. Precondition: finite and not negative.
+  // Sets the friction of all faces of an object, from the next step on. Precondition: `friction` is finite and not
+  // negative.
   void set_friction(std::int32_t object, double friction) noexcept {
     for (Face& face : faces_) {
       if (face.object == object) face.mu = friction;
@@ -56,8 +58,10 @@ class PlaneComposition final : public GeometricAlgorithm<3> {
   bool search(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
 
   std::vector<Face> faces_;
-  std::vector<GrooveLine> lines_;     // of all pairs, at i · n + j; empty if there are too many faces to store them
-  std::vector<CornerPoint> corners_;  // of all triples, at (i · n + j) · n + k; empty if there are too many faces
+  // The lines of all pairs, at i · n + j; empty if the faces are too many for this table.
+  std::vector<GrooveLine> lines_;
+  // The corners of all triples, at (i · n + j) · n + k; empty if the faces are too many for this table.
+  std::vector<CornerPoint> corners_;
   std::array<Contact<3>, 3> contacts_{};
   std::size_t count_ = 0;
   std::uint64_t without_friction_ = 0;

@@ -11,12 +11,12 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
-// The longest push, as a multiple of the object's motion at q. The push is that motion over the sine of the angle
-// between surface and guide, so ten allows angles down to about 6°; below, the object would throw the proxy far along
-// the guide.
+// The longest push of the proxy along the guide, as a multiple of the object's motion at q. A push is this motion
+// divided by the sine of the angle between the object's surface and the guide. So ten allows angles down to about 6°;
+// at smaller angles the object would throw the proxy far along the guide.
 constexpr double longest_push = 10.0;
 
-// Whether a proxy that the object has carried to `carried` may end at x, outside the object.
+// Whether a proxy that the object has carried to `carried` may end at x, and x is outside the object.
 bool is_clear(const Obstacle& object, const Vec3& carried, const Vec3& x) noexcept {
   return !object.excludes(carried, x) && object.distance(x) >= 0.0;
 }
@@ -35,7 +35,7 @@ PlaneGuide::PlaneGuide(const Vec3& point_m, const Vec3& normal, double friction)
 }
 
 Vec3 PlaneGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexcept {
-  // (4) for the half-space that p is behind: the plane holds from both sides.
+  // Applies (4) to the half-space that p is behind, because the plane holds the proxy from both sides.
   const bool above = surface_.height(p) > 0.0;
   const FlatSurface<3> side = above ? FlatSurface<3>::of_unit(surface_.point(), Vec3(-surface_.normal())) : surface_;
   const FaceStep<3> s = step_on_face(side, mu_, p, q);
@@ -64,7 +64,7 @@ PolylineGuide PolylineGuide::line(const Vec3& point_m, const Vec3& direction, do
   return guide;
 }
 
-// The nearest piece; the first of several equally near ones (at a corner).
+// Returns the piece nearest to q. If several pieces are equally near (at a corner), returns the first of them.
 std::size_t PolylineGuide::nearest_piece(const Vec3& q) const noexcept {
   std::size_t best = 0;
   double least = infinity;
@@ -90,8 +90,9 @@ Vec3 PolylineGuide::report(const Vec3& r, const Vec3& p, std::size_t piece, bool
   return r;
 }
 
-// Whether the straight way between two points is free. If not, `to` becomes the point where an object stops the proxy,
-// or `from` if rounding can't tell the two apart.
+// Whether the straight path from `from` to `to` is free. If it isn't, `to` becomes the point where an object stops the
+// proxy, or `from` if the two points are equal within rounding. With `past_pushing`, objects that push in this step
+// don't count.
 bool PolylineGuide::leads(const Vec3& from, Vec3& to, bool past_pushing) noexcept {
   if (from == to) return true;
   bool free = true;
@@ -125,14 +126,15 @@ void PolylineGuide::set_time(const StepTime& time) noexcept {
   for (const World::Entry& mover : *movers_) mover.obstacle->set_time(time.time_s, time.period_s);
 }
 
-// Changes `piece` to its neighbour; false at an end of the guide.
+// Changes `piece` to its neighbour. Returns false at an end of the guide.
 bool PolylineGuide::next_piece(std::size_t& piece, bool forward) const noexcept {
   if (!closed_ && (forward ? piece + 1 == pieces_.size() : piece == 0)) return false;
   piece = forward ? (piece + 1) % pieces_.size() : (piece + pieces_.size() - 1) % pieces_.size();
   return true;
 }
 
-// Moves a place by a length (m) along the guide, at most to the guide's end.
+// Returns the place at the distance `by` (m, signed) from `at` along the guide, or the end of the guide if that is
+// nearer.
 PolylineGuide::Place PolylineGuide::advance(Place at, double by) const noexcept {
   const bool forward = by > 0.0;
   for (std::size_t visited = 0; visited <= pieces_.size(); ++visited) {
@@ -153,8 +155,8 @@ PolylineGuide::Place PolylineGuide::advance(Place at, double by) const noexcept 
   return at;
 }
 
-// Moves a place that the object covers to the next free place on one side: doubles the step until the place is free,
-// then bisects. False if there is no free place within `most` (m).
+// Moves `place`, which the object covers, to the next free place on one side: doubles the step until a place is free,
+// then bisects. Returns false if no place within `most` (m) is free.
 bool PolylineGuide::clear_of(const Obstacle& object, const Vec3& carried, int side, double most,
                              Place& place) const noexcept {
   if (!(most > 0.0)) return false;
@@ -182,7 +184,8 @@ bool PolylineGuide::clear_of(const Obstacle& object, const Vec3& carried, int si
   return true;
 }
 
-// The direction along the piece in which an object that covers q pushes; 0: it pushes across the piece.
+// Returns the direction along the piece in which an object that covers q pushes: 1, −1, or 0 if the object pushes
+// across the piece. Fills in `contact`.
 int PolylineGuide::pushed_to(const Obstacle& object, const Vec3& carried, const Vec3& q, std::size_t piece,
                              Contact<3>& contact) const noexcept {
   const Obstacle::Step s = object.step(1.0, q, q);
@@ -193,7 +196,7 @@ int PolylineGuide::pushed_to(const Obstacle& object, const Vec3& carried, const 
   return lean > 0.0 ? 1 : lean < 0.0 ? -1 : 0;
 }
 
-// Whether the way along the guide between two places is free of all objects except those that push.
+// Whether no object blocks the path along the guide from `from` to `to`. Objects that push in this step don't count.
 bool PolylineGuide::reaches(Place from, const Place& to, int side) noexcept {
   for (std::size_t visited = 0; visited <= pieces_.size() && from.piece != to.piece; ++visited) {
     const Piece& piece = pieces_[from.piece];
@@ -206,8 +209,8 @@ bool PolylineGuide::reaches(Place from, const Place& to, int side) noexcept {
   return leads(from.x, end, true);
 }
 
-// Moves the place of q along with the objects that cover it. False if there is no room: the proxy is squeezed, and the
-// place doesn't change.
+// Moves `place`, the place of q, along with the objects that cover it. Returns false if the objects leave no room: the
+// proxy is then squeezed, and `place` doesn't change.
 bool PolylineGuide::carry(const Vec3& q, Place& place) noexcept {
   if (!movers_) return true;
   const Place begin = place;
@@ -226,7 +229,7 @@ bool PolylineGuide::carry(const Vec3& q, Place& place) noexcept {
     fits = fits && pushed != 0 && (side == 0 || pushed == side);
     side = pushed;
     const double most = longest_push * (carried - q).norm();
-    // Another object may have pushed the place far enough already.
+    // Another object may already have pushed `place` far enough.
     if (!fits || is_clear(object, carried, place.x)) continue;
     Place pushed_place = begin;
     fits = clear_of(object, carried, side, most, pushed_place);
@@ -249,7 +252,7 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
   const Piece& nearest = pieces_[place.piece];
   place.s = std::clamp(nearest.e.dot(q - nearest.a), nearest.begin, nearest.length);
   const Vec3 foot = nearest.a + place.s * nearest.e;
-  // A proxy on the guide within rounding (as in FlatSurface::rounding) sticks bit for bit.
+  // A proxy that is on the guide within rounding (as in FlatSurface::rounding) and sticks is returned bit for bit.
   if (!((q - foot).lpNorm<1>() <= 16.0 * u * (q.lpNorm<1>() + nearest.a.lpNorm<1>() + std::abs(place.s)))) {
     place.x = foot;
   }
@@ -269,7 +272,7 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
   return r;
 }
 
-// The place to which (4) takes a proxy along a piece.
+// Returns where (4) takes a proxy along a piece. `from`: the proxy's position along the piece, m.
 PolylineGuide::Lead PolylineGuide::lead(const Piece& piece, const Vec3& p, double from) const noexcept {
   const Vec3 d = p - piece.a;
   const double s_p = piece.e.dot(d), reach = mu_ * (d - s_p * piece.e).norm();
@@ -277,13 +280,14 @@ PolylineGuide::Lead PolylineGuide::lead(const Piece& piece, const Vec3& p, doubl
   return {s_p - std::copysign(reach, s_p - from), s_p > from ? 1 : -1};
 }
 
-// The step by (4) from a place on, around corners if the next piece leads on.
+// Makes the step by (4) from `place`. The proxy goes around a corner if the next piece leads it on in the same
+// direction.
 Vec3 PolylineGuide::slide(const Vec3& p, const Place& place) noexcept {
   std::size_t i = place.piece;
   const double begin = pieces_[i].begin, length = pieces_[i].length;
   Lead way = lead(pieces_[i], p, place.s);
   if (way.side == 0) {
-    // This piece doesn't lead the proxy away. At a corner the neighbour may.
+    // This piece doesn't lead the proxy away. If the proxy is in a corner, the neighbouring piece may lead it away.
     const bool in_corner = pieces_.size() > 1 && (place.s == begin || place.s == length);
     if (!in_corner) return report(place.x, p, i, false);
     way = place.s == length ? Lead{infinity, 1} : Lead{-infinity, -1};
@@ -304,7 +308,8 @@ Vec3 PolylineGuide::slide(const Vec3& p, const Place& place) noexcept {
     std::size_t next = i;
     if (!next_piece(next, forward)) return report(corner, p, i, false);
     const Lead on = lead(pieces_[next], p, forward ? pieces_[next].begin : pieces_[next].length);
-    if (on.side != way.side) return report(corner, p, i, false);  // held at the corner
+    // The next piece doesn't lead the proxy on in this direction, so the corner holds the proxy.
+    if (on.side != way.side) return report(corner, p, i, false);
     i = next;
     way = on;
   }

@@ -1,10 +1,12 @@
-// Media act on the proxy without a surface: viscous and Coulomb media, everywhere or within a shape, over any 𝒢.
+// Renders media, which act on the proxy without a surface: viscous and Coulomb media, everywhere or within a shape, in
+// addition to any 𝒢.
 //
-// A viscous medium of b (Ns/m) adds −(b/T)(r − q) to ℳ. Let 𝒢' be the rest of the world and f' its force:
+// A viscous medium with damping b (Ns/m) adds −(b/T)(r − q) to ℳ. Let 𝒢' be the rest of the world and f' its force:
 //   f'(r) = K (r − p) + (b/T)(r − q) = (K + b/T)(r − p'),   p' = (K p + (b/T) q)/(K + b/T).
-// So the medium acts like a stiffer coupling to a nearer point: 𝒢(K, p, q) = 𝒢'(K + b/T, p', q). In free space q(k) =
-// p'. coulomb_step.hpp solves a step in a Coulomb medium. The media at q act in a step. T is the step's period, at
-// order 2 the effective one. Precondition: set_time() is called before each step.
+// So the medium acts as a stiffer coupling to a point p' that is nearer to q than p is: 𝒢(K, p, q) = 𝒢'(K + b/T, p',
+// q). In free space q(k) = p'. coulomb_step.hpp solves a step in a Coulomb medium. A medium acts in a step if it
+// contains q. T is the period in StepTime (at order 2 two thirds of the cycle). Precondition: set_time() is called
+// before each step.
 #pragma once
 
 #include <cstdint>
@@ -20,16 +22,17 @@ namespace proxarm::models {
 
 struct Medium {
   double damping_Ns_per_m = 0.0;
-  double force_N = 0.0;             // of the Coulomb friction
-  std::unique_ptr<Obstacle> shape;  // the medium acts within it and on its surface; null: everywhere
+  double force_N = 0.0;  // the force of Coulomb friction
+  // The medium acts within this shape and on its surface. null: the medium acts everywhere.
+  std::unique_ptr<Obstacle> shape;
 };
 
 template <int N>
 class Media final : public GeometricAlgorithm<N> {
  public:
-  static constexpr double first_period_s = 1e-3;  // T until the first set_time()
+  static constexpr double first_period_s = 1e-3;  // T until the first call of set_time()
 
-  // The proxy's coordinates are the first N of a frame S; `X_WS` is the pose of S in W. Shapes are in W.
+  // The proxy's coordinates are the first N coordinates of a frame S; `X_WS` is the pose of S in W. Shapes are in W.
   Media(std::unique_ptr<GeometricAlgorithm<N>> rest, std::vector<Medium> media, double period_s = first_period_s,
         const Pose& X_WS = Pose::Identity())
       : rest_(std::move(rest)), media_(std::move(media)), X_WS_(X_WS), T_(period_s) {}
@@ -46,7 +49,7 @@ class Media final : public GeometricAlgorithm<N> {
     return F > 0.0 ? coulomb(kappa, F, p_v, q) : (*rest_)(kappa, p_v, q);
   }
 
-  // One bit for each medium; from the 33rd on, media share bits with the first ones.
+  // Sets one bit for each medium that contains q. From the 33rd medium on, media share bits with the first media.
   [[nodiscard]] std::uint32_t media_at(const Vec<N>& q) const noexcept override {
     std::uint32_t held = 0;
     for (std::size_t i = 0; i < media_.size(); ++i) {

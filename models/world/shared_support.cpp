@@ -13,8 +13,8 @@ namespace {
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 constexpr std::size_t most = SharedSupport::most;
 constexpr int most_rounds = 4;
-// Limit for ‖p − q‖ and for the sum of forces over K. Typical steps are micrometres. Forces settle to 64 u of this, 0.1
-// nm; beyond, rounding would be as large as layers are thin.
+// Limit for ‖p − q‖ and for the sum of the forces over K. Typical steps are micrometres. Forces settle to 64 u of this
+// limit, which is 0.1 nm. With a larger limit, rounding would be as large as the thickness of thin layers.
 constexpr double farthest_m = 1e4;
 static_assert(3 * most <= most_equations);
 
@@ -22,10 +22,11 @@ struct FlatContact {
   FlatSurface<3> surface = FlatSurface<3>::of_unit(Vec3::Zero(), Vec3::UnitZ());
   double mu = 0.0;
   Layer layer;
-  Vec3 q = Vec3::Zero();  // the previous proxy, carried along by the obstacle's motion
+  // The last position of the proxy, carried along by the obstacle's motion.
+  Vec3 q = Vec3::Zero();
 };
 
-// 𝒢_i(K, p_i, q) by (4) with its layer, and D = ∂r/∂p_i.
+// The step 𝒢_i(K, p_i, q) by (4) on a plane with its layer, and the derivative D = ∂r/∂p_i.
 struct Response {
   Vec3 r;
   Mat3 D;
@@ -35,7 +36,7 @@ Response respond(const FlatContact& c, double K, const Vec3& p) noexcept {
   const Vec3& n = c.surface.normal();
   const double h_p = c.surface.height(p);
   if (h_p > 0.0) return {p, Mat3::Identity()};
-  double h = 0.0, gives = 0.0;  // height of r above the surface, and its derivative by h_p
+  double h = 0.0, gives = 0.0;  // height of r above the surface, and the derivative of this height by h_p
   if (c.layer.soft()) {
     gives = K / (K + c.layer.stiffness_N_per_m);
     h = gives * h_p;
@@ -55,7 +56,7 @@ Response respond(const FlatContact& c, double K, const Vec3& p) noexcept {
           gives * nn + (1.0 - share) * T + share * e * e.transpose() + c.mu * (1.0 - gives) * e * n.transpose()};
 }
 
-// The forces of all contacts over K, on given tangent planes.
+// Finds the forces of all contacts over K, on given tangent planes.
 class FlatSupport {
  public:
   std::array<FlatContact, most> contact;
@@ -64,19 +65,20 @@ class FlatSupport {
   Vec3 r;
   int budget = 0;
 
-  // The residual at which forces count as settled: the rounding of r, m.
+  // Returns the residual (m) at which forces count as settled: the rounding of r.
   [[nodiscard]] double rounding_m() const noexcept { return 64.0 * u * size_; }
 
-  // The sum of the forces' sizes over K, m.
+  // Returns the sum of ‖f_i‖/K over all contacts, m.
   [[nodiscard]] double squeeze_m() const noexcept {
     double sum = 0.0;
     for (std::size_t i = 0; i < count; ++i) sum += x[i].norm();
     return sum;
   }
 
-  // By Assumption 1 a contact's force is the same for every stiffness, so Newton's method may use another one. It tries
-  // K first, then stiffnesses that keep the points p_i near their surfaces, where the equations are closer to linear; a
-  // few steps with K then remove the other stiffness's rounding.
+  // Solves for the forces by Newton's method. By Assumption 1, a contact's force is the same for every stiffness, so
+  // Newton's method may use another stiffness than K. It tries K first, and then stiffnesses that keep the points p_i
+  // near their surfaces, where the equations are closer to linear. After another stiffness, a few steps with K remove
+  // the rounding that it caused.
   bool solve(double K, const Vec3& p) noexcept {
     const std::array<Vec3, most> start = x;
     double k = 0.0;
@@ -101,8 +103,9 @@ class FlatSupport {
   enum class Haste : std::uint8_t { few_steps, none };
   static constexpr int most_steps = 40, bold_steps = 8, most_stuck = 4;
 
-  // Newton's method. The first steps are always taken (`bold`): the way to the right pieces of (4) may lead over larger
-  // residuals. Later steps must reduce the residual; otherwise Gauss–Seidel sweeps take over.
+  // Runs Newton's method from the present forces. The first steps are taken even if the residual grows (`bold`),
+  // because on the path to the right pieces of (4) the residual may be larger. Each later step must reduce the
+  // residual; otherwise Gauss–Seidel sweeps follow.
   bool solve_from_here(double K, const Vec3& p, Haste haste) noexcept {
     double apart = evaluate(K, p);
     int stuck = 0;
@@ -123,8 +126,9 @@ class FlatSupport {
     return apart <= 64.0 * u * size_;
   }
 
-  // One nonlinear Gauss–Seidel sweep: each contact in turn, with the latest forces of the others. Rigid contacts come
-  // first, because the proxy's previous position already gives the layers' forces.
+  // Makes one nonlinear Gauss–Seidel sweep: solves for each contact in turn, with the latest forces of the other
+  // contacts. Rigid contacts come first, because the layers' forces are already known approximately from the proxy's
+  // last position.
   void sweep(double K, const Vec3& p) noexcept {
     budget -= static_cast<int>(count * count);
     for (const bool soft : {false, true}) {
@@ -139,7 +143,7 @@ class FlatSupport {
     }
   }
 
-  // Computes the residuals R_i = 𝒢_i(σK, r − x_i/σ) − r with r = p + Σ x_j and σ = stiffer_. Returns their largest
+  // Computes the residuals R_i = 𝒢_i(σK, r − x_i/σ) − r, where r = p + Σ x_j and σ = stiffer_. Returns their largest
   // component.
   double evaluate(double K, const Vec3& p) noexcept {
     r = p;
@@ -156,8 +160,8 @@ class FlatSupport {
     return apart;
   }
 
-  // Solves A dx = b. Rigid contacts that stick leave open how they share the force; A is then singular, and any
-  // solution will do.
+  // Returns a solution of A dx = b. If rigid contacts stick, their shares of the force aren't unique. A is then
+  // singular, and any solution is sufficient.
   template <int Size>
   static Unknowns solution(const Equations& A, const Unknowns& b) noexcept {
     const Eigen::Matrix<double, Size, Size> square = A;
@@ -166,9 +170,10 @@ class FlatSupport {
     return solve_least_squares(A, b);
   }
 
-  // One Newton step with backtracking, for the linear system (D_i − I) Σ dx_j − D_i dx_i/σ = −R_i for all i, σ =
-  // stiffer_. Returns true if the residual `apart` went down by at least a quarter of the step's share; otherwise the
-  // forces are unchanged. With `bold`, takes the full step and returns true.
+  // Makes one Newton step with backtracking. The step solves the linear system (D_i − I) Σ dx_j − D_i dx_i/σ = −R_i for
+  // all i, where σ = stiffer_. Returns true if the residual `apart` became smaller by at least a quarter of the
+  // fraction of the step that was taken; otherwise the forces are unchanged. With `bold`, takes the whole step and
+  // returns true.
   bool step(double K, const Vec3& p, double& apart, bool bold) noexcept {
     budget -= static_cast<int>(count * count * count);
     const Eigen::Index n = 3 * static_cast<Eigen::Index>(count);
@@ -203,7 +208,7 @@ class FlatSupport {
   double size_ = 0.0, stiffer_ = 1.0;
 };
 
-// Solves on tangent planes, taken anew at each solution until r settles.
+// Solves the contacts on tangent planes, and repeats this with the tangent planes at each solution until r settles.
 bool settle(SharedSupport& support, FlatSupport& flat, double K, const Vec3& p, const Vec3& q) noexcept {
   Settling settling(q);
   for (int k = 0; k < most_settling; ++k) {
@@ -221,8 +226,8 @@ bool settle(SharedSupport& support, FlatSupport& flat, double K, const Vec3& p, 
   return false;
 }
 
-// The final r. The sum p + Σ f_i/K has its own rounding, but a surface that can't yield (rigid, or a layer pressed
-// through to its core) gives r exactly. A proxy that sticks to a contact stays bit for bit.
+// Returns the final r. The sum p + Σ f_i/K has a rounding error. But a surface that can't yield (a rigid surface, or a
+// layer pressed down to its core) gives r exactly. A proxy that sticks to a contact is returned bit for bit.
 Vec3 placed(const SharedSupport& support, const FlatSupport& flat, const Vec3& q) noexcept {
   Vec3 r = flat.r;
   std::size_t hard = 0, rigid = most;
@@ -247,10 +252,11 @@ Vec3 placed(const SharedSupport& support, const FlatSupport& flat, const Vec3& q
 
 enum class Confirmed : std::uint8_t { yes, no, other_features };
 
-// Asks each obstacle itself, including its edges and curvature, with the forces of the others held.
+// Checks flat.r by the step of each obstacle itself, with its edges and curvature, while the forces of the other
+// obstacles are fixed.
 Confirmed confirm(SharedSupport& support, const FlatSupport& flat, double K, const Vec3& p, const Vec3& q) noexcept {
-  // A tolerance between two scales: edges and curvature cause far larger differences, rounding smaller ones for objects
-  // of up to a hundred metres.
+  // The tolerance is between two scales: edges and curvature cause far larger differences, and rounding causes smaller
+  // differences for objects of up to a hundred metres.
   const double nothing = 1e-12 * (1.0 + p.lpNorm<1>() + q.lpNorm<1>());
   bool agree = true, others = false;
   for (std::size_t i = 0; i < flat.count; ++i) {
@@ -283,8 +289,8 @@ bool SharedSupport::solve(double K, const Vec3& p, const Vec3& q) noexcept {
     c.layer = obstacle[i]->layer();
     flat.x[i] = Vec3::Zero();
     if (!c.layer.soft()) continue;
-    // The first guess of a layer's force is that of its depth at q. It is exact if friction elsewhere holds the proxy;
-    // a sweep from zero would add only a fraction K/k of it.
+    // The first guess of a layer's force is the force at the layer's depth at q. It is exact if friction on other
+    // contacts holds the proxy. From zero, a sweep would add only a fraction K/k of the force.
     const FlatSurface<3> surface = obstacle[i]->tangent(c.q, step[i].feature).surface;
     const double depth = std::clamp(-surface.height(c.q), 0.0, c.layer.thickness_m);
     flat.x[i] = (c.layer.stiffness_N_per_m / K * depth) * surface.normal();

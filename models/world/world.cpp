@@ -18,12 +18,12 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// If up to `crowd` obstacles press, all their pairs and triples are tried, 10 in all. If more press, only `chosen` of
-// them count: 20 pairs and triples, some microseconds each.
+// If up to `crowd` obstacles press, the search tries all their pairs and triples, which are 10 in all. If more
+// obstacles press, the search uses only `chosen` of them, which gives 20 pairs and triples of some microseconds each.
 constexpr std::size_t crowd = 4, chosen = 5;
 constexpr int most_attempts = 64;
 
-// Two obstacles that hold the proxy between them, each with one feature.
+// Two obstacles that hold the proxy between them, each by one feature.
 struct PairOfSurfaces {
   const Obstacle &a, &b;
   std::int32_t feature_a, feature_b;
@@ -31,13 +31,14 @@ struct PairOfSurfaces {
 
 struct SettledPair {
   bool settled = false;
-  GrooveSolution groove;  // found: the iteration has settled, and both contacts press
+  // `found`: the iteration has settled, and both contacts press.
+  GrooveSolution groove;
   Vec3 r = Vec3::Zero();
   Obstacle::Tangent t_a, t_b;
 };
 
-// Solves the groove of two tangent planes, taken anew at each solution until it settles. On the way a contact may pull;
-// `found` is true only if both press in the end.
+// Solves the groove between two tangent planes, and repeats this with the tangent planes at each solution until r
+// settles. During the iteration a contact may pull. `found` is true only if both contacts press at the end.
 SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, const Vec3& from,
                    GrooveSearch search) noexcept {
   const Vec3 q_a = pair.a.carry(q), q_b = pair.b.carry(q);
@@ -62,7 +63,7 @@ SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, con
     const Obstacle::Tangent n_a = pair.a.tangent(settling.at(), pair.feature_a),
                             n_b = pair.b.tangent(settling.at(), pair.feature_b);
     out.settled = n_a.surface.normal() == out.t_a.surface.normal() && n_b.surface.normal() == out.t_b.surface.normal();
-    if (out.settled) return out;  // flat
+    if (out.settled) return out;  // both surfaces are flat here
     out.t_a = n_a;
     out.t_b = n_b;
   }
@@ -70,14 +71,15 @@ SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, con
   return out;
 }
 
-// Up to three planes that hold a point: the nearest point to p on their free side.
+// Up to three planes that hold a point r. r is the point nearest to p on the free side of these planes.
 class HoldingPlanes {
  public:
-  // Adds one more plane and drops those that no longer hold. False if no point is found.
+  // Adds one more plane and drops planes that no longer hold r. Returns false if it finds no point.
   bool exchange(const Obstacle::Step& plane, const Vec3& p, Vec3& r) noexcept {
     std::array<const Obstacle::Step*, 4> all{&plane};
     for (std::size_t i = 0; i < count_; ++i) all[i + 1] = planes_[i];
-    // Of all sets of the planes, smallest first: the first set whose point is on the free side of all planes.
+    // Tries all sets of the planes, the smallest sets first, and takes the first set whose point is on the free side of
+    // all planes.
     const unsigned sets = 1u << (count_ + 1);
     for (int size = 1; size <= 3; ++size) {
       for (unsigned set = 1; set < sets; ++set) {
@@ -94,7 +96,7 @@ class HoldingPlanes {
  private:
   bool hold(const std::array<const Obstacle::Step*, 4>& all, unsigned set, const Vec3& p, Vec3& r) noexcept {
     std::array<const Obstacle::Step*, 3> planes{};
-    Mat3 G = Mat3::Identity();  // dot products of the normals; identity beyond the set's size
+    Mat3 G = Mat3::Identity();  // dot products of the normals; identity beyond the number of planes in the set
     Vec3 depth = Vec3::Zero();
     std::size_t n = 0;
     for (std::size_t i = 0; i < all.size(); ++i) {
@@ -129,13 +131,13 @@ class HoldingPlanes {
 }  // namespace
 
 struct World::Choice : NearestSet {
-  std::array<Contact<3>, 3> contacts{};  // in shared_ if `shared`
+  std::array<Contact<3>, 3> contacts{};  // unused if `shared`: the contacts are then in shared_
   std::size_t count = 0;
   bool shared = false;
-  bool free = false;  // p is reached without contact
+  bool free = false;  // the proxy reaches p without contact
   bool resolved = true;
 
-  // True if this set is better than the best so far; the caller then fills in its contacts.
+  // Returns true if this point is nearer to p than the best point so far; the caller then fills in the contacts.
   bool better(const Vec3& p, const Vec3& at, std::size_t contact_count) noexcept {
     if (!improve(p, at)) return false;
     count = contact_count;
@@ -155,8 +157,8 @@ void World::Candidates::add(std::size_t i, const Obstacle::Step& step) noexcept 
   grew = true;
 }
 
-// Adds another face of a mesh that is already a candidate. It counts only together with other candidates: for the mesh
-// alone, Obstacle::step has already solved all faces.
+// Adds another face of a mesh that is already a candidate. This face is used only together with other candidates,
+// because Obstacle::step has already solved all faces of the mesh alone.
 void World::add_face(std::size_t i, const Obstacle::Step& step, Candidates& candidates) noexcept {
   if (candidates.count == Candidates::most || !step.touches) return;
   for (std::size_t c = 0; c < candidates.count; ++c) {
@@ -192,17 +194,18 @@ void World::set_time(const StepTime& time) noexcept {
   for (const std::size_t i : moving_) entries_[i].obstacle->set_time(time.time_s, time.period_s);
 }
 
-// Gathers into near_ all obstacles that the step can meet. Returns the radius of the searched ball around (p + q)/2, at
-// least `reach`. In convex free space (r − p)ᵀ(r − q) ≤ 0, so r lies in the ball with the diameter qp (Thales). Around
-// a convex solid of radius R it may lie outside by ‖r − q‖²/2R; twice the radius covers this. If springy layers or
-// moving objects take r farther, operator() gathers again.
+// Gathers into near_ all obstacles that the step can meet. Returns the radius of the searched ball around (p + q)/2,
+// which is at least `reach`. The radius is chosen as follows:
+// 1. In convex free space (r − p)ᵀ(r − q) ≤ 0, so r is in the ball whose diameter is the segment from q to p (Thales).
+// 2. Around a convex solid of radius R, r may be outside this ball by ‖r − q‖²/2R. Twice the ball's radius covers this.
+// 3. If layers that spring back or moving objects take r farther, operator() gathers again.
 double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
   const Vec3 middle = 0.5 * (p + q);
   const double radius = std::max(reach, (p - q).norm() * (1.0 + 1e-9) + 1e-12 * (1.0 + p.lpNorm<1>()));
   near_.resize(near_fixed_);
   if (!((middle - near_centre_).norm() + radius <= near_radius_)) {
-    // Twice the radius plus a millimetre, so that a proxy in contact, which moves by micrometres, rarely asks the tree.
-    // More would make each step test more obstacles.
+    // near_ is gathered for twice the radius plus a millimetre. So for a proxy in contact, which moves by micrometres,
+    // the tree is rarely searched. A larger ball would make each step test more obstacles.
     near_radius_ = 2.0 * radius + 1e-3;
     near_centre_ = middle;
     near_.clear();
@@ -210,7 +213,7 @@ double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
       if (entries_[i].obstacle->distance(middle) <= near_radius_) near_.push_back(i);
     }
     tree_.within(middle, near_radius_, [&](std::size_t i) { near_.push_back(i); });
-    std::sort(near_.begin(), near_.end());  // so that results don't depend on the tree's order
+    std::sort(near_.begin(), near_.end());  // so that results don't depend on the order in the tree
     near_fixed_ = near_.size();
   }
   for (const std::size_t i : moving_) {
@@ -230,7 +233,8 @@ void World::add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& c
   for (const Pressed& pressed : pressed_) candidates.add(pressed.index, pressed.step);
 }
 
-// Adds to pressed_ the obstacles that aren't in the way to p, but in the way to r. True if there are any.
+// Adds to pressed_ the obstacles that block the path to r, although they don't block the path to p. Returns whether it
+// added any.
 bool World::add_those_at(double K, const Vec3& p, const Vec3& q, const Vec3& r) noexcept {
   const std::size_t before = pressed_.size();
   for (const std::size_t i : near_) {
@@ -246,11 +250,16 @@ bool World::add_those_at(double K, const Vec3& p, const Vec3& q, const Vec3& r) 
   return pressed_.size() > before;
 }
 
-// Reduces pressed_ to the obstacles that would hold the proxy without friction, and the next nearest ones. Each
-// obstacle counts as its plane at the step alone, and p is projected onto the planes' polyhedron by a dual method: to
-// the planes that hold the point, add the plane that it is deepest behind, and move to the nearest point to p on their
-// free side, until the point is on the free side of all. The distance to p grows each time, so no set comes twice.
-// Depths up to a billionth of that distance are ignored.
+// Reduces pressed_ to `chosen` obstacles: the obstacles that would hold the proxy without friction, and the obstacles
+// that are nearest after these.
+// 1. Each obstacle is replaced by a plane: the tangent plane at the end of the obstacle's step alone.
+// 2. p is projected onto the polyhedron of these planes by a dual method. It starts at r = p.
+// 3. Each exchange adds the plane that r is deepest behind to the planes that hold r, and moves r to the point nearest
+//    to p on the free side of the holding planes.
+// 4. When r is on the free side of all planes, obstacles that block the path to r are added. The exchanges end when no
+//    such obstacle exists.
+// 5. The distance from r to p grows in each exchange, so no set of planes occurs twice. Depths of up to a billionth of
+//    this distance are ignored.
 void World::choose(double K, const Vec3& p, const Vec3& q) noexcept {
   constexpr int most_exchanges = 64;
   constexpr double passed = 1e-9;
@@ -267,8 +276,8 @@ void World::choose(double K, const Vec3& p, const Vec3& q) noexcept {
   for (const Pressed& pressed : pressed_) {
     if (holding.has(pressed.step)) likely_[likely_count_++] = pressed.index;
   }
-  // Planes that hold the point have depth zero, others less. Ties are broken by index, because results depend on the
-  // order.
+  // Planes that hold r have depth zero, and all other planes have smaller depths. Equal depths are ordered by index,
+  // because results depend on the order.
   std::partial_sort(pressed_.begin(), pressed_.begin() + chosen, pressed_.end(),
                     [&](const Pressed& a, const Pressed& b) {
                       return depth(a) != depth(b) ? depth(a) > depth(b) : a.index < b.index;
@@ -277,8 +286,8 @@ void World::choose(double K, const Vec3& p, const Vec3& q) noexcept {
   std::sort(pressed_.begin(), pressed_.end(), [](const Pressed& a, const Pressed& b) { return a.index < b.index; });
 }
 
-// Whether the proxy gets from q to r around an obstacle in the straight way: over the edge where the obstacle releases
-// it. All other obstacles must let it pass there, too.
+// Whether the proxy gets from q to r around an obstacle that blocks the straight path. The proxy goes over the edge of
+// the obstacle. All other obstacles must allow a proxy at this edge, too.
 bool World::gets_around(const Obstacle& obstacle, const Vec3& p, const Vec3& q, const Vec3& r) const noexcept {
   const Vec3 edge = obstacle.detour(p, q);
   if (edge == q || obstacle.excludes(edge, r)) return false;
@@ -294,8 +303,8 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
   for (const std::size_t i : near_) {
     const Obstacle& obstacle = *entries_[i].obstacle;
     const bool member = std::find(contacts.begin(), contacts.end(), i) != contacts.end();
-    // A mesh that holds the proxy with one face may be in its way with another. A mesh alone has solved that itself, so
-    // only sets of two and more are checked.
+    // A mesh that holds the proxy with one face may block its path with another face. For a mesh alone, the mesh's own
+    // step has already solved this, so only sets of two and more obstacles are checked.
     Vec3 normal;
     if (member && (contacts.size() < 2 || !obstacle.parts(obstacle.carry(q), r, normal))) continue;
     const bool presses = !member && soft_ && obstacle.presses_at(r);
@@ -304,12 +313,12 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
     all = false;
     const bool known = candidates.has(i);
     if (known && !member && !obstacle.parts(obstacle.carry(q), r, normal)) continue;
-    // The obstacle isn't in the way to p, but in the way to r. Its step towards r gives the feature.
+    // The obstacle blocks the path to r, although it doesn't block the path to p. The step towards r gives the feature.
     Obstacle::Step s = obstacle.step(K, r, q);
     if (known) {
       add_face(i, s, candidates);
     } else {
-      // An obstacle that is also in the way to p, but wasn't chosen from the crowd, gets its step towards p.
+      // If the obstacle also blocks the path to p, but wasn't chosen from the crowd, its step towards p is used.
       const Obstacle::Step alone = obstacle.step(K, p, q);
       if (s.touches && alone.touches) s = alone;
       s.touches = alone.touches && s.touches;
@@ -319,9 +328,9 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
   return all;
 }
 
-// Whether all these obstacles are at r: pairs and triples are solved on planes, but beyond a face's edges its plane
-// holds nothing. The tolerance lies between two scales: rounding is smaller for objects of up to a hundred metres, and
-// a proxy held 1e-12 m off a face's edge counts as held at the edge.
+// Whether all these obstacles touch r. This is checked because pairs and triples are solved on planes, but a face
+// exerts no force beyond its edges. The tolerance is between two scales: rounding is smaller for objects of up to a
+// hundred metres, and a proxy that is 1e-12 m beyond a face's edge may count as held at the edge.
 bool World::all_touch(const Vec3& r, std::span<const std::size_t> contacts) const noexcept {
   const double nothing = 1e-12 * (1.0 + r.lpNorm<1>());
   return std::all_of(contacts.begin(), contacts.end(),
@@ -360,14 +369,15 @@ void World::try_pair(double K, const Vec3& p, const Vec3& q, std::array<std::siz
   const PairOfSurfaces pair{*entries_[m[0]].obstacle, *entries_[m[1]].obstacle, candidates.alone[own[0]].feature,
                             candidates.alone[own[1]].feature};
   SettledPair s = settle(pair, p, q, q, GrooveSearch::first_root);
-  // A contact that pulls at the first root may press at another.
+  // A contact that pulls at the first root may press at another root.
   if (s.settled && !s.groove.found) s = settle(pair, p, q, s.r, GrooveSearch::all_roots);
   if (!s.groove.found || !fits(q, s.r, m, candidates, K, p) || !all_touch(s.r, m) || !choice.better(p, s.r, 2)) return;
   choice.contacts[0] = contact_of(candidates, own[0], s.groove.slips1, s.t_a.surface.normal());
   choice.contacts[1] = contact_of(candidates, own[1], s.groove.slips2, s.t_b.surface.normal());
 }
 
-// Solves the corner of three tangent planes, taken anew at each new corner until it settles.
+// Solves the corner of three tangent planes, and repeats this with the tangent planes at each new corner until the
+// corner settles.
 void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<std::size_t, 3>& own,
                        Candidates& candidates, Choice& choice) noexcept {
   if (!may_try()) return;
@@ -407,8 +417,8 @@ void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<
   }
 }
 
-// In a crowd, tries single obstacles, then the set that would hold the proxy without friction. Other sets come later,
-// because each that fails brings in more of the crowd.
+// In a crowd, tries single obstacles first, and then the set that would hold the proxy without friction. Other sets are
+// tried later, because each set that fails adds more obstacles of the crowd to the candidates.
 bool World::try_likely(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
   try_singles(K, p, q, candidates, choice);
   if (choice.found() || likely_count_ < 2) return choice.found();
@@ -428,7 +438,7 @@ bool World::try_likely(double K, const Vec3& p, const Vec3& q, Candidates& candi
   return choice.found();
 }
 
-// Tries all candidates at once if one of them has an elastic layer: those that press share the force.
+// Tries all candidates at once if one of them has an elastic layer. The candidates that press share the force.
 void World::try_together(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
   const std::span<const std::size_t> all{candidates.index.data(), candidates.count};
   if (std::none_of(all.begin(), all.end(), [this](std::size_t i) { return elastic_[i]; })) return;
@@ -480,7 +490,7 @@ bool World::search(double K, const Vec3& p, const Vec3& q, Candidates& candidate
       });
 }
 
-// Whether all near obstacles allow a proxy from q to end at r.
+// Whether all near obstacles allow a proxy that comes from q to end at r.
 bool World::is_free(const Vec3& q, const Vec3& r) const noexcept {
   return std::none_of(near_.begin(), near_.end(), [&](std::size_t i) {
     const Obstacle& obstacle = *entries_[i].obstacle;
@@ -488,8 +498,8 @@ bool World::is_free(const Vec3& q, const Vec3& r) const noexcept {
   });
 }
 
-// The fallback if no set is complete: the proxy stays if it is allowed at q. Otherwise it takes the step of the one
-// obstacle whose step ends nearest to p.
+// Ends a step for which no set is complete. The proxy stays at q if all obstacles allow a proxy at q. Otherwise it
+// takes the step of the single obstacle whose step ends nearest to p.
 void World::stay(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept {
   const bool allowed = is_free(q, q);
   for (std::size_t c = 0; c < candidates.count; ++c) {
@@ -513,7 +523,8 @@ double World::distance(const Vec3& x) const noexcept {
   return tree_.nearest(x, least, [&](std::size_t i) { return entries_[i].obstacle->distance(x); });
 }
 
-// Finds the step's end and its contacts. False if no set of contacts was complete.
+// Finds the point at which the step ends, and the contacts at this point. Returns false if no set of contacts was
+// complete.
 bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexcept {
   Candidates& candidates = candidates_;
   candidates.clear();
@@ -529,7 +540,7 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexce
   if (search(K, p, q, candidates, choice)) return choice.resolved;
   candidates.around = true;
   if (search(K, p, q, candidates, choice)) return choice.resolved;
-  // Beyond the radius of a curved surface, or on a long step past several objects, the iteration on tangent planes may
+  // Beyond the radius of a curved surface, or in a long step past several objects, the iteration on tangent planes may
   // find nothing. The proxy then goes as far as a shorter step leads: p is moved halfway towards q, up to six times.
   Vec3 nearer = p;
   for (int k = 0; k < 6 && !choice.found(); ++k) {
@@ -539,7 +550,7 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexce
     if (fewer.count > 0) {
       search(K, nearer, q, fewer, choice);
     } else {
-      choice.improve(p, nearer);  // this shorter way is free
+      choice.improve(p, nearer);  // the path of this shorter step is free
     }
   }
   if (!choice.found()) stay(p, q, candidates, choice);
@@ -573,7 +584,7 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
   Choice choice;
   bool found = solve(K, p, q, choice);
   // A moving object, a layer that springs back, or an obstacle that the proxy has to leave may take r out of the
-  // searched ball. The step is then repeated with all obstacles near its end.
+  // searched ball. Then the step is repeated with all obstacles near its end.
   for (std::size_t known = 0; known != near_.size() && !choice.free;) {
     known = near_.size();
     const double away = (choice.r - 0.5 * (p + q)).norm();
@@ -590,8 +601,8 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
   count_ = choice.count;
   are_shared_ = choice.shared;
   if (choice.free && moving_.empty()) {
-    // The step is free: with the clearance at p, later steps can be free without a search. Moving objects would
-    // invalidate it.
+    // The step is free. The clearance at p is stored, so that later steps within it need no search. With moving objects
+    // a stored clearance wouldn't remain true.
     double room = infinity;
     for (const std::size_t i : unbounded_) room = std::min(room, entries_[i].obstacle->distance(p));
     clearance_ = tree_.nearest(p, room, [&](std::size_t i) { return entries_[i].obstacle->distance(p); });

@@ -1,17 +1,21 @@
-// A world of any number of obstacles.
+// Renders a world of any number of obstacles.
 //
-// Each obstacle near the step is asked for its step alone. If all others allow that point, it is the solution.
-// Otherwise pairs and triples of contacts are solved as in a PlaneComposition (contact_search.hpp), on the tangent
-// planes at the solution itself. For curved surfaces the planes are taken anew at each point until it settles
-// (settling.hpp). Among complete sets, fewer contacts come first, then the smallest ‖r − p‖.
+// A step is solved as follows:
+// 1. Each obstacle near the step is solved alone. If all other obstacles allow the resulting point, it is the solution.
+// 2. Otherwise pairs and triples of contacts are solved on tangent planes, as in a PlaneComposition
+//    (contact_search.hpp).
+// 3. For curved surfaces, step 2 is repeated with the tangent planes at each new point until it settles (settling.hpp).
+// 4. Smaller complete sets have priority. Among complete sets of one size, the set with the smallest ‖r − p‖ is taken.
 //
-// If five or more objects press in one place, World::choose picks those that would hold the proxy without friction.
-// They are tried first, then other sets, up to most_attempts in a step. So a step among a thousand objects costs little
-// more than one among ten; a step still without a solution counts as unresolved.
+// If five or more objects press at one place, World::choose finds the objects that would hold the proxy without
+// friction. These are tried first, then other sets, up to most_attempts sets in a step. So a step among a thousand
+// objects costs little more than a step among ten. If the step has no solution after most_attempts, it counts as
+// unresolved.
 //
-// If an elastic layer presses together with other obstacles, all that press share the force (shared_support.hpp).
+// If an elastic layer presses together with other obstacles, all obstacles that press share the force
+// (shared_support.hpp).
 //
-// A step with q and p within the last known clearance touches nothing and skips all this.
+// If q and p are both within the last known clearance, the step touches nothing and none of this is done.
 #pragma once
 
 #include <array>
@@ -28,11 +32,12 @@ namespace proxarm::models {
 
 class World final : public GeometricAlgorithm<3> {
  public:
-  // Contacts report `object`. Several obstacles may be one object: a box seen from inside is six.
+  // An obstacle, and the numbers that its contacts report. Several obstacles may be one object: a box seen from inside
+  // is six obstacles.
   struct Entry {
     std::unique_ptr<Obstacle> obstacle;
     std::int32_t object = 0;
-    std::int32_t feature = -1;  // reported; -1: the obstacle's feature
+    std::int32_t feature = -1;  // feature that contacts report; -1: they report the obstacle's feature
   };
   explicit World(std::vector<Entry> entries);
 
@@ -43,33 +48,35 @@ class World final : public GeometricAlgorithm<3> {
     return {are_shared_ ? shared_.data() : contacts_.data(), count_};
   }
 
-  // Signed distance to the nearest obstacle, metres; infinite in an empty world.
+  // Returns the signed distance from x to the nearest obstacle, metres; infinite in an empty world.
   [[nodiscard]] double distance(const Vec3& x) const noexcept;
 
-  // How far a point gets along the straight way from x to y before an obstacle stops it. For a proxy with no other way
-  // to go, as on a guide. Precondition: no obstacle excludes x.
+  // Finds how far a point gets along the straight path from x to y before an obstacle stops it. For a proxy that can't
+  // take another path, as on a guide. Precondition: no obstacle excludes x.
   struct Sweep {
     Vec3 end;
     bool stopped = false;
-    Contact<3> contact;  // with the obstacle that stopped it
+    Contact<3> contact;  // the contact with the obstacle that stopped the point
   };
   [[nodiscard]] Sweep sweep(const Vec3& x, const Vec3& y) noexcept;
 
-  // Steps so far in which no set of contacts was complete: a jam, or a tool deeper than a curved surface's radius. The
-  // proxy then goes as far as a shorter step leads, or stays.
+  // Returns the number of steps so far in which no set of contacts was complete, because of a jam or because the tool
+  // was deeper than a curved surface's radius. In these steps the proxy goes as far as a shorter step leads, or stays.
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
   [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
 
  private:
-  // The obstacles that may be part of the solution, and their steps alone. Typical steps have one to three. Candidates
-  // beyond the twelfth are dropped; the step counts as unresolved if no set of the twelve is complete.
+  // The obstacles that may be part of the solution, and the step of each obstacle alone. Typical steps have one to
+  // three candidates. Candidates beyond the twelfth are dropped; if no set of the twelve is complete, the step counts
+  // as unresolved.
   struct Candidates {
     static constexpr std::size_t most = 12;
     std::array<std::size_t, most> index{};
     std::array<Obstacle::Step, most> alone{};
     std::size_t count = 0;
     bool grew = false;
-    bool around = false;  // points beyond an object count as reached if it lets the proxy go around, see gets_around()
+    // If true, a point beyond an object is allowed if the proxy can go around the object; see gets_around().
+    bool around = false;
 
     void clear() noexcept {
       count = 0;
@@ -80,7 +87,7 @@ class World final : public GeometricAlgorithm<3> {
   };
   struct Choice;
 
-  // An obstacle that would hold the proxy alone.
+  // An obstacle that would hold the proxy if it were alone.
   struct Pressed {
     std::size_t index = 0;
     Obstacle::Step step;
@@ -113,29 +120,29 @@ class World final : public GeometricAlgorithm<3> {
 
   std::vector<Entry> entries_;
   std::vector<std::size_t> unbounded_;  // obstacles without finite bounds
-  std::vector<std::size_t> moving_;     // moving ones, bounded or not
-  BoundsTree tree_;                     // all others
+  std::vector<std::size_t> moving_;     // moving obstacles, with or without finite bounds
+  BoundsTree tree_;                     // all resting obstacles with finite bounds
   std::vector<bool> elastic_;           // for each obstacle: whether it has an elastic layer
-  bool soft_ = false;                   // whether any has
-  // The obstacles that a step may meet: first the resting ones within near_radius_ of near_centre_, gathered anew only
-  // when a step leaves that ball; then the moving ones that are close in this step.
+  bool soft_ = false;                   // whether any obstacle has an elastic layer
+  // The obstacles that a step may meet. First come the resting obstacles within near_radius_ of near_centre_, which are
+  // gathered again only when a step leaves that ball. Then come the moving obstacles that are near in this step.
   std::vector<std::size_t> near_;
   std::size_t near_fixed_ = 0;
   Vec3 near_centre_ = Vec3::Zero();
   double near_radius_ = -1.0;
-  Candidates candidates_;  // a member, so that a step needn't initialise all of it
+  Candidates candidates_;  // a member, so that a step needn't initialise the whole arrays
   std::array<Contact<3>, 3> contacts_{};
   std::array<Contact<3>, Candidates::most> shared_{};  // used instead of contacts_ if elastic layers share the force
   bool are_shared_ = false;
-  std::vector<Pressed> pressed_;         // of this step; reserved for all obstacles
+  std::vector<Pressed> pressed_;         // the obstacles that press in this step; memory is reserved for all obstacles
   std::array<std::size_t, 3> likely_{};  // obstacles of a crowd that would hold the proxy without friction
   std::size_t likely_count_ = 0;
   int attempts_left_ = 0;   // pairs and triples that this step may still try
-  int support_budget_ = 0;  // what SharedSupport may still spend in this step
+  int support_budget_ = 0;  // the budget that SharedSupport may still use in this step
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;
   bool squeezed_ = false;
-  // No obstacle is closer than clearance_ to clear_at_. Used only in worlds without moving obstacles.
+  // No obstacle is closer than clearance_ (m) to clear_at_. Used only in worlds without moving obstacles.
   Vec3 clear_at_ = Vec3::Zero();
   double clearance_ = -1.0;
 };

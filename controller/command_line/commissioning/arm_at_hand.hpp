@@ -1,4 +1,5 @@
-// The arm that commissioning moves: a simulated one in this process and in virtual time, or one on interfaces.
+// Provides the arm that commissioning moves: a simulated arm in this process and in virtual time, or an arm on
+// interfaces.
 #pragma once
 
 #include <string>
@@ -13,7 +14,7 @@
 
 namespace proxarm::command_line {
 
-// A simulated hand without mass, stiffness and damping.
+// Returns a simulated hand without mass, stiffness and damping.
 description::HandDescription nobody();
 
 // Precondition: `arm` outlives this object.
@@ -22,7 +23,8 @@ struct SimulatedArm {
                const description::HandDescription& hand = nobody());
 
   void power_on();
-  // Brings the devices up and returns the parts of a cycle for this arm. Precondition: `scene` outlives the parts.
+  // Brings the devices up, and returns the parts of a cycle for this arm. Precondition: `scene` outlives the returned
+  // parts.
   controller::CycleParts brought_up(const PreparedSession& session, scenes::CompiledScene& scene);
 
   fieldbus::SimulatedCanNetwork network;
@@ -30,10 +32,11 @@ struct SimulatedArm {
 };
 
 struct ArmOnInterfaces {
-  // Opens the interfaces, for a real arm after consent. Throws SetupError as `run` does.
+  // Opens the interfaces. A real arm needs consent first (live/hardware_consent.hpp). Throws SetupError as `run` does.
   ArmOnInterfaces(const PreparedSession& session, const RunOptions& options);
 
-  // As above.
+  // Brings the devices up, and returns the parts of a cycle for this arm. Precondition: `scene` outlives the returned
+  // parts.
   controller::CycleParts brought_up(const PreparedSession& session, scenes::CompiledScene& scene);
 
   std::vector<std::string> interfaces;

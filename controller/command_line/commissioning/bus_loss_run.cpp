@@ -22,7 +22,8 @@ namespace {
 using description::Json;
 using proof::OwnStop;
 
-// A drive measures the time by its own clock, and its stop is seen only in its next frame.
+// Allowance for the measured time. A drive measures the silence by its own clock, and the drive's stop is seen only in
+// the drive's next frame.
 constexpr double drives_own_clock_s = 0.005;
 
 struct Outcome {
@@ -99,7 +100,7 @@ Outcome on_interfaces(const PreparedSession& session, const RunOptions& options)
   return outcome;
 }
 
-// Empty: the drive stopped by itself in time.
+// Returns how a drive failed; empty if the drive stopped by itself within `promised_s`.
 std::string failure_of(const OwnStop& stop, double promised_s) {
   if (!stop.off_at_last) return "is still enabled";
   if (stop.reacts_s < 0.0) return "is off at last, but nothing on the bus said when";
@@ -136,7 +137,7 @@ Json json_of(const std::vector<OwnStop>& stops, double promised_s, bool proven, 
   return json;
 }
 
-// Returns whether the file also holds the rest of the proof.
+// Adds the stops to the cell's proof. Returns whether the file also holds the rest of the proof.
 bool keep(const PreparedSession& session, const Outcome& outcome, const std::filesystem::path& file) {
   const std::string hash = cell_sha256(session);
   ProofFile proof{hash, outcome.real_arm, today(), "drives stop without the controller", false, {}};

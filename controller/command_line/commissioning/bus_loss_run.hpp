@@ -1,4 +1,5 @@
-// `proxarm prove --bus-loss`: silences the controller on purpose, against a simulated arm or on interfaces.
+// Runs `proxarm prove --bus-loss`: silences the controller on purpose, with a simulated arm or an arm on interfaces,
+// and finds how the drives stop.
 #pragma once
 
 #include <filesystem>
@@ -7,8 +8,8 @@
 
 namespace proxarm::command_line {
 
-// Prints how and when each drive on CAN stopped, and adds that to `file`, the cell's proof. Exit status 1: a drive
-// didn't stop within supervision.bus_loss_stop_s. `arm` is the session of the simulated arm.
+// Prints how and when each drive on CAN stopped, and adds that to the cell's proof, `file`. `arm` is the session of the
+// simulated arm. Returns the exit status, which is 1 if a drive didn't stop within supervision.bus_loss_stop_s.
 int prove_bus_loss(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
                    const std::filesystem::path& file);
 

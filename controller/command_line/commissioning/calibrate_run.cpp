@@ -27,7 +27,7 @@ using Slots = std::vector<fieldbus::DriveSlot>;
 
 constexpr std::int64_t listen_ns = 100'000'000, boot_ns = 200'000'000;
 
-// The cell's drives, for requests only: none is configured.
+// The cell's drives, used for requests only. No drive is configured.
 class Drives {
  public:
   Drives(const description::Cell& cell, const controller::BusIndices& indices) {
@@ -61,7 +61,7 @@ void listen(fieldbus::CanNetwork& network, std::int64_t time_ns, const fieldbus:
   });
 }
 
-// Accepts the drives' answers, and the messages of an enabling input on a bus.
+// Makes the kernel pass the drives' answers, and the messages of an enabling input that is on a bus.
 void pass_answers(fieldbus::SocketCanNetwork& network, const Slots& slots,
                   const std::optional<controller::EnablingInput>& enabling) {
   for (std::size_t bus = 0; bus < network.bus_count(); ++bus) {
@@ -81,7 +81,8 @@ std::vector<std::int32_t> read_counts(fieldbus::CanNetwork& network, const Slots
   return counts;
 }
 
-// Marks are on the links, encoders on the motors. Gravity twists the gears, so the motor angles differ from the marks.
+// Returns the motor angles for marked angles. The marks are on the links, and the encoders on the motors. Gravity
+// twists the gears between them, so motor angles and marks differ.
 std::vector<double> motor_angles(const description::Cell& cell, const std::vector<double>& link_rad) {
   const models::Arm arm(cell);
   const models::JointVector link = Eigen::Map<const Eigen::VectorXd>(link_rad.data(), arm.axes());
@@ -116,7 +117,7 @@ void ask_for_pose(const description::Cell& cell, const std::vector<double>& angl
   }
 }
 
-// The enabling switch of the person beside the arm, if it is a message on a bus.
+// Returns the enabling input if the switch sends its own messages on a bus; otherwise nullopt.
 std::optional<controller::EnablingInput> enabling_message(const PreparedSession& session,
                                                           const controller::BusIndices& indices) {
   const auto& input = session.cell.enabling_input;
@@ -135,7 +136,8 @@ class Interfaces {
     require_nodes_apart(session, names_);
     listen(session);
   }
-  // Called after each wait for the person, before drives are asked: another session may have begun meanwhile.
+  // Listens for another controller, and sets the filters. Called after each wait for the person, before drives are
+  // asked, because another session may have begun during the wait.
   void listen(const PreparedSession& session) {
     listen_before_speaking(network_, drives_.slots());
     pass_answers(network_, drives_.slots(), enabling_message(session, indices_in(network_, names_.size())));
@@ -172,7 +174,8 @@ std::vector<MarkedPose> marked_poses(const PreparedSession& session, const Prepa
   return poses;
 }
 
-// Returns whether all poses after the first agree with it; prints each joint that doesn't.
+// Returns whether all poses after the first agree with the offsets from the first. Prints each joint that doesn't
+// agree.
 bool poses_agree(const description::Cell& cell, const std::vector<MarkedPose>& poses,
                  const std::vector<std::int32_t>& offsets, double tolerance_rad) {
   bool agree = true;
@@ -238,7 +241,7 @@ class Permission {
   std::atomic<bool> stopped_{false};
 };
 
-// One joint after the other, so that a mistake moves only one.
+// Moves the joints to their homes one after the other, so that with a mistake in the cell only one joint moves.
 void home_all(fieldbus::CanNetwork& network, const Slots& slots, Permission& permission) {
   const fieldbus::FrameHandler on_frame = [&](std::size_t bus, const fieldbus::TimedFrame& received) {
     permission.on_frame(bus, received);

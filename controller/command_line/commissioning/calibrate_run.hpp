@@ -1,4 +1,4 @@
-// `proxarm calibrate`: finds the zeros of the encoders.
+// Runs `proxarm calibrate`, which finds the zeros of the encoders.
 #pragma once
 
 #include <filesystem>
@@ -10,13 +10,16 @@ namespace proxarm::command_line {
 
 struct CalibrateOptions {
   RunOptions run;
-  std::filesystem::path arm;            // cell of the simulated arm; empty: the same cell
-  std::vector<std::vector<double>> at;  // angles of all joints as marked on the arm; empty: start_rad, once
-  bool home = false;                    // move incremental encoders to their home
-  double tolerance_rad = 0.01;          // largest difference between marks and encoders, in the poses after the first
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the controller's cell
+  // For each pose, the angles of all joints as marked on the arm. Empty: one pose, start_rad.
+  std::vector<std::vector<double>> at;
+  bool home = false;  // move the joints with incremental encoders to their home
+  // Largest difference that is allowed between marks and encoders, in the poses after the first.
+  double tolerance_rad = 0.01;
 };
 
-// Exit status 1: the poses don't fit one another; the cell is unchanged.
+// Finds the zeros and writes them into the cell. Returns the exit status, which is 1 if the poses don't fit one
+// another; then the cell is unchanged.
 int calibrate(const PreparedSession& session, const PreparedSession& arm, const CalibrateOptions& options);
 
 }  // namespace proxarm::command_line

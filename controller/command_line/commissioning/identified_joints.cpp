@@ -34,7 +34,7 @@ std::string formatted(const char* format, double value) {
   return word.data();
 }
 
-// Rounds to the second digit of the uncertainty, as further digits have no meaning.
+// Returns the value as text, rounded to the second digit of its uncertainty `half`, as further digits have no meaning.
 std::string value_text(double value, double half) {
   const int decimals = half > 0.0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(half))), 0, 7) : 6;
   std::array<char, 40> word{};
@@ -60,7 +60,8 @@ std::string line(const JointFigure& figure, bool compare) {
   return told + "\n";
 }
 
-// The range of a drive's entry in the cell's text: from its `joint:` to the next one, or to the end of the section.
+// Returns the range of a drive's entry in the cell's text: from the entry's `joint:` to the next `joint:`, or to the
+// end of the section.
 std::pair<std::size_t, std::size_t> entry_of(const std::string& text, const std::string& joint) {
   std::string pattern = R"(\bjoint:\s*["']?)";
   for (const char c : joint)
@@ -75,7 +76,7 @@ std::pair<std::size_t, std::size_t> entry_of(const std::string& text, const std:
   return {from, ends ? from + 6 + static_cast<std::size_t>(end.position(0)) : text.size()};
 }
 
-// Replaces the number behind each occurrence of the key in the entry; returns their count.
+// Replaces the number behind each occurrence of the key in the joint's entry. Returns how many numbers were replaced.
 int replace_all(std::string& text, const std::string& joint, const std::string& key, const std::string& fresh) {
   const std::regex pattern("\\b" + key + R"(:\s*([-+.0-9eE]+))");
   int replaced = 0;
@@ -108,8 +109,9 @@ std::string bare(const std::string& key) {
                     .expected = fresh});
 }
 
-// Adds a missing key to the entry of a joint's drive, or to the entry's `simulation`. If the entry has no `simulation`
-// because it takes all from simulation_defaults, adds that, too. Returns false if the key can't be added.
+// Adds a missing key to the entry of a joint's drive, or to the entry's `simulation` map. If the entry has no
+// `simulation` map because all its values come from simulation_defaults, adds the map, too. Returns false if the key
+// can't be added.
 bool insert(std::string& text, const std::string& joint, const std::string& key, const std::string& fresh) {
   const std::vector<description::YamlStep> entry{{"drives"}, {"joint", joint}};
   const std::size_t dot = key.find('.');
@@ -121,7 +123,8 @@ bool insert(std::string& text, const std::string& joint, const std::string& key,
   return description::insert_key(text, {entry[0], entry[1], {map}}, bare(key), fresh);
 }
 
-// Overrides a key of simulation_defaults in the `simulation` of one joint's drive, unless it has that key already.
+// Sets a key of simulation_defaults to a value of its own in the `simulation` map of one joint's drive, unless the map
+// has that key already.
 void own_simulation(std::string& text, const std::string& joint, const std::string& key, const std::string& fresh) {
   const bool is_own = description::has_key(text, {{"drives"}, {"joint", joint}, {"simulation"}}, key);
   if (is_own || !description::has_key(text, {{"simulation_defaults"}}, key)) return;
@@ -134,12 +137,12 @@ std::string with_joints(const std::string& text, const std::vector<JointFigure>&
     if (!figure.estimate.found) continue;
     const std::string fresh = formatted("%.6g", figure.estimate.value);
     const int replaced = replace_all(changed, figure.joint, bare(figure.key), fresh);
-    // The damping must also be in the drive itself: the controller doesn't read `simulation`.
+    // The damping must also be in the drive's own map, because the controller doesn't read the `simulation` map.
     const bool inserted =
         (replaced == 0 || figure.key == damping_key) && insert(changed, figure.joint, figure.key, fresh);
     if (replaced == 0 && !inserted) refuse(cell, figure, fresh);
     if (figure.key == damping_key) own_simulation(changed, figure.joint, damping_key, fresh);
-    // The stiffness found is the real one, so the simulation must not scale it any more.
+    // The identified stiffness is the real one, so the simulation must no longer scale it.
     if (figure.key == stiffness_key && replace_all(changed, figure.joint, "gear_stiffness_ratio", "1") == 0) {
       own_simulation(changed, figure.joint, "gear_stiffness_ratio", "1");
     }

@@ -32,7 +32,7 @@ Json with_half(const std::vector<double>& values, const std::vector<double>& hal
   return {{"value", json(values)}, {"uncertainty", json(half)}};
 }
 
-// Decimals up to the second digit of the uncertainty, as further digits have no meaning.
+// Returns the number of decimals up to the second digit of the smallest uncertainty, as further digits have no meaning.
 int decimals(const std::vector<double>& half) {
   const double least = *std::min_element(half.begin(), half.end());
   if (!(least > 0.0)) return 6;
@@ -58,7 +58,8 @@ std::string line(const char* name, const std::vector<double>& values, const std:
   return text.data();
 }
 
-// The range of a section at the left margin: from its key to the next section's.
+// Returns the range in the text of the section whose key `key` is at the left margin: from that key to the next
+// section's key.
 std::pair<std::size_t, std::size_t> section(const std::string& text, const std::string& key) {
   std::size_t from = text.rfind(key + ":", 0) == 0 ? 0 : text.find("\n" + key + ":");
   if (from == std::string::npos) return {text.size(), text.size()};
@@ -69,7 +70,7 @@ std::pair<std::size_t, std::size_t> section(const std::string& text, const std::
   return {from, found ? from + static_cast<std::size_t>(match.position(0)) : text.size()};
 }
 
-// Replaces the value of a key of the section; `value` is a regular expression for the old value.
+// Replaces the value of a key in the section `tool`. `value` is a regular expression for the old value.
 void replace(std::string& text, const Cell& cell, const std::string& key, const std::string& value,
              const std::string& fresh) {
   const auto [from, to] = section(text, "tool");

@@ -1,4 +1,5 @@
-// The result of `proxarm identify`: prints it as text and JSON, compares it with the cell, and writes it there.
+// Prints the result of `proxarm identify` as text and JSON, compares it with the cell and CELL.zero, and writes it
+// there.
 #pragma once
 
 #include <array>
@@ -14,12 +15,13 @@
 
 namespace proxarm::command_line {
 
-// A value in the cell or its CELL.zero, and the identified value.
+// One quantity: the value in the cell or in CELL.zero, and the identified value.
 struct ToolDifference {
   std::string key;
   std::vector<double> in_cell, found, half;  // half: half the width of the 95 % interval
 
-  [[nodiscard]] bool differs() const noexcept;  // by more than the interval in any component
+  // Returns whether in any component the values differ by more than half the interval's width.
+  [[nodiscard]] bool differs() const noexcept;
 };
 
 struct IdentifiedTool {
@@ -35,7 +37,7 @@ struct IdentifiedTool {
   [[nodiscard]] bool whole() const noexcept { return found() && fit.centre_found; }
 };
 
-// `zero`: the zero kept beside the cell, if any.
+// Returns all quantities with both values. `zero` is the zero that is kept beside the cell; nullopt: none is kept.
 std::vector<ToolDifference> compare(const IdentifiedTool& tool, const description::Cell& cell,
                                     const std::optional<ZeroFile>& zero);
 
@@ -44,13 +46,13 @@ std::string text(const std::vector<ToolDifference>& differences);
 description::Json json(const IdentifiedTool& tool);
 description::Json json(const std::vector<ToolDifference>& differences);
 
-// Returns the cell's text with this tool.mass_kg and tool.centre_of_mass_S_m; everything else stays. Throws SetupError
-// if a key isn't found.
+// Returns the cell's text with tool.mass_kg and tool.centre_of_mass_S_m set to these values; all other text stays.
+// Throws SetupError if a key isn't found.
 std::string with_tool(const std::string& text, const description::Cell& cell, double mass_kg,
                       const std::array<double, 3>& centre_S_m);
 
-// Writes both values to the cell's file, and the new cell's zero to CELL.zero. Returns the path of the cell's backup.
-// Precondition: whole(). Throws SetupError.
+// Writes the mass and the centre of mass into the cell's file, and the zero, with the hash of the new cell, into
+// CELL.zero. Returns the path of the backup of the cell's file. Precondition: tool.whole(). Throws SetupError.
 std::filesystem::path write_tool(const IdentifiedTool& tool, const PreparedSession& session);
 
 }  // namespace proxarm::command_line

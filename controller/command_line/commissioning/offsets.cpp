@@ -12,7 +12,7 @@ namespace {
 
 using description::SetupError;
 
-// Returns where `joint: NAME` ends in the text, comments excluded; npos if it isn't there.
+// Returns where the first `joint: NAME` after `from` that isn't in a comment ends; npos if there is none.
 std::size_t end_of_joint(const std::string& text, const std::string& joint, std::size_t from) {
   const std::regex key(R"((^|[\s{,-])joint:\s*["']?)" + joint + R"(["']?(?=[\s,}#]|$))");
   std::smatch match;
@@ -27,7 +27,7 @@ std::size_t end_of_joint(const std::string& text, const std::string& joint, std:
   return std::string::npos;
 }
 
-// Returns where the next drive begins, or the end of the section.
+// Returns where the next drive after `from` begins, or where the section ends.
 std::size_t end_of_drive(const std::string& text, std::size_t from) {
   static const std::regex next(R"((^|\n)\s*-\s*\{?\s*joint:|\n[A-Za-z_])");
   std::smatch match;

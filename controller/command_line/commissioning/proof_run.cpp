@@ -25,8 +25,8 @@ ProofOutcome outcome_of(const proof::ProofSession& session) {
   return outcome;
 }
 
-// Runs cycles until the proof ends. A process that slept through some periods skips them, and the proof ends: meanwhile
-// the drives have stopped by themselves, or are about to.
+// Runs cycles until the proof ends. If the process slept through some periods, they are skipped, and the proof ends,
+// because by then the drives have stopped by themselves or are about to.
 template <typename BeforeCycle>
 void run(proof::ProofSession& proof, fieldbus::CanNetwork& network, double period_s, const BeforeCycle& before) {
   const std::int64_t period_ns = std::llround(1e9 * period_s);
@@ -45,7 +45,7 @@ void run(proof::ProofSession& proof, fieldbus::CanNetwork& network, double perio
   proof.shut_down();
 }
 
-// Leans on the handle in the requested direction while asked to.
+// Pushes the simulated arm's handle in the requested direction while the proof asks for it.
 class SimulatedHand {
  public:
   explicit SimulatedHand(sim::SimulatedCell& arm) : arm_(arm) {}
@@ -68,7 +68,7 @@ class SimulatedHand {
   models::Vec3 from_W_ = models::Vec3::Zero();
 };
 
-// Prints requests in its own thread, so that the cycle doesn't wait for a terminal.
+// Prints the proof's requests in a separate thread, so that the cycle doesn't wait for a terminal.
 class Announcer {
  public:
   Announcer(const proof::ProofSession& proof) : proof_(proof), thread_([this] { loop(); }) {}

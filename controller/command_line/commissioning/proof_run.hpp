@@ -1,5 +1,5 @@
-// Runs `proxarm prove`, and commands that move the arm in the same way, against a simulated arm in this process or on
-// interfaces.
+// Runs `proxarm prove`, and commands that move the arm as `prove` does, with a simulated arm in this process or an arm
+// on interfaces.
 #pragma once
 
 #include <filesystem>
@@ -19,31 +19,32 @@ struct ProofOutcome {
   bool real_arm = false;
 };
 
-// Says why the session ended early, or that the brakes don't hold; empty: no failure.
+// Returns why the session ended early, or that the brakes don't hold, as text; empty if nothing failed.
 std::string failure_of(const PreparedSession& session, const ProofOutcome& outcome);
 
-// Runs in virtual time and prints nothing. `arm` is the simulated arm, which may differ from the controller's cell. A
-// simulated hand pushes when asked; a hand in options.hand replaces it.
+// Runs the task with a simulated arm in virtual time, and prints nothing. `arm` is the session of the simulated arm,
+// whose cell may differ from the controller's cell. A simulated hand pushes when the proof asks for it. If options.hand
+// names a hand, that hand replaces it.
 ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
                              const proof::Task& task = {});
 
-// Runs on the interfaces of options.bus in real time, and prints on standard error what the person is to do. Throws
-// SetupError as `run` does, but needs no proof.
+// Runs the task on the interfaces of options.bus in real time, and prints on standard error what the person is to do.
+// Throws SetupError as `run` does, except that the cell needs no proof.
 ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options,
                                  const proof::Task& task = {});
 
-// Throws SetupError.
+// A function that prepares a command's session, and throws SetupError.
 using PrepareSession = PreparedSession (*)(const RunOptions& options);
 
-// Prepares a session that moves the arm. Refuses a real arm without --hardware, options of a simulation on interfaces,
-// a missing enabling switch, and a bus that can't carry the timestep. `arm`: the cell of the simulated arm; empty: the
-// command's own. Throws SetupError.
+// Prepares the controller's session for a command that moves the arm. Throws SetupError for --hardware with simulated
+// buses, for options of a simulated arm with interfaces, for --enabling without a simulated enabling switch, and if a
+// bus can't carry the timestep. `arm` is the cell of the simulated arm; empty: the command's own cell.
 PreparedSession session_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare);
 
-// Prepares the simulated arm's session: from the cell `arm`, or from the command's own if empty. Throws SetupError.
+// Prepares the session of the simulated arm. `arm` is the arm's cell; empty: the command's own cell. Throws SetupError.
 PreparedSession arm_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare);
 
-// Calls prove_simulated() if the bus is simulated, else prove_on_interfaces().
+// Runs the task by prove_simulated() if the buses are simulated, else by prove_on_interfaces().
 ProofOutcome prove_arm(const PreparedSession& session, const RunOptions& options, const std::filesystem::path& arm,
                        PrepareSession prepare, const proof::Task& task = {});
 

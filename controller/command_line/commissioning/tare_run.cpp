@@ -13,7 +13,7 @@ namespace {
 using controller::Cycle;
 
 constexpr std::size_t record_capacity = 64;
-// A limit that isn't reached: the session ends once the sensor is tared, or by a fault.
+// A duration that no session reaches, because the session ends when the sensor is tared, or by a fault.
 constexpr double never_s = 86400.0;
 
 ZeroOutcome tared(const PreparedSession& session, Cycle& cycle, fieldbus::CanNetwork& network, bool real_arm) {

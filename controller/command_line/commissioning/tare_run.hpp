@@ -1,4 +1,4 @@
-// `proxarm zero`: a session that only tares the sensor.
+// Runs `proxarm zero`: a session that only tares the sensor.
 #pragma once
 
 #include "controller/command_line/preparation/prepared_session.hpp"
@@ -13,7 +13,7 @@ struct ZeroOutcome {
   ZeroFile zero;
 };
 
-// Both enable the drives, tare the sensor, and switch the drives off.
+// Both functions enable the drives, tare the sensor, and switch the drives off.
 ZeroOutcome tare_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options);
 ZeroOutcome tare_on_interfaces(const PreparedSession& session, const RunOptions& options);
 

@@ -16,7 +16,8 @@ ChildProcess start_child(std::vector<std::string> words, const std::vector<int>&
     if (stream == STDERR_FILENO && errors == ErrorStream::shared) continue;
     posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_RDWR, 0);
   }
-  // Copies with numbers above the wanted ones, so that no descriptor is overwritten before it is copied.
+  // First copies all descriptors to numbers above those that the program gets, so that no descriptor is overwritten
+  // before it is copied.
   std::vector<int> high;
   for (const int descriptor : descriptors) {
     high.push_back(fcntl(descriptor, F_DUPFD_CLOEXEC, above_all));

@@ -1,5 +1,5 @@
-// The exit statuses. A session in which the arm oscillated by itself for a second or more (report/oscillation.hpp) ends
-// with the status of a fault.
+// Defines the exit statuses. A session in which the arm oscillated by itself for a second or more
+// (report/oscillation.hpp) ends with fault_ended_the_run.
 #pragma once
 
 namespace proxarm::command_line {

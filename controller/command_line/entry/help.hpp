@@ -1,4 +1,4 @@
-// Lays out help: names on the left, wrapped texts on the right.
+// Lays out the help of commands: names on the left, wrapped descriptions on the right.
 #pragma once
 
 #include <CLI/CLI.hpp>

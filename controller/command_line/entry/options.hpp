@@ -1,4 +1,5 @@
-// Parsers of option values. They run while CLI11 parses the command line, so that its messages name the option.
+// Makes parsers of option values. CLI11 calls a parser while it parses the command line, so CLI11's error message names
+// the option.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -14,7 +15,7 @@
 
 namespace proxarm::command_line {
 
-// A number with its unit.
+// Returns a parser of a number with its unit.
 template <typename Parse, typename Store>
 CLI::callback_t quantity(Parse parse, Store store) {
   return [parse, store](const CLI::results_t& words) {
@@ -38,11 +39,12 @@ CLI::callback_t choice(std::string option, std::map<std::string, Value> choices,
   };
 }
 
-// Returns CLI11's message about options as one line, with the nearest option that `command` knows.
+// Returns CLI11's message about options as one line, with the option of `command` that is spelt most like the wrong
+// one.
 std::string options_mistake(const CLI::App& command, const std::vector<std::string>& words,
                             const CLI::ParseError& error);
 
-// In decimal digits.
+// Returns a parser of a whole number in decimal digits.
 CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_t)> store);
 
 }  // namespace proxarm::command_line

@@ -13,7 +13,7 @@
 namespace proxarm::command_line {
 
 void open_standard_descriptors() noexcept {
-  // open() returns the lowest free number, which is the one wanted here.
+  // open() returns the lowest free number. All descriptors below `descriptor` are open, so that number is `descriptor`.
   for (int descriptor = STDIN_FILENO; descriptor <= STDERR_FILENO; ++descriptor) {
     if (fcntl(descriptor, F_GETFD) != -1) continue;
     [[maybe_unused]] const int opened = open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
@@ -25,7 +25,7 @@ int flush_standard_output(int status) noexcept {
   std::cout.flush();
   const bool lost = std::fflush(stdout) != 0 || std::ferror(stdout) != 0 || !std::cout;
   if (!lost) return status;
-  if (errno == 0) {  // the error happened earlier; another character fails for the same reason
+  if (errno == 0) {  // the write failed earlier; another one sets errno
     std::fputc('\n', stdout);
     std::fflush(stdout);
   }

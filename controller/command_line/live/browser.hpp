@@ -1,4 +1,4 @@
-// Opens an address of the view in the user's browser, without showing it to other users.
+// Opens the view's address in the user's browser, without showing the address to other users.
 #pragma once
 
 #include <string>
@@ -7,15 +7,17 @@ namespace proxarm::command_line {
 
 class BrowserDoor {
  public:
-  // Opens the address if there is a desktop and a terminal; otherwise does nothing. Never throws, because the address
-  // is printed anyway.
+  // Opens the address if there is a desktop and a terminal; otherwise does nothing. Doesn't throw if the browser can't
+  // be started, because the address is printed anyway.
   explicit BrowserDoor(const std::string& url);
   BrowserDoor(const BrowserDoor&) = delete;
   BrowserDoor& operator=(const BrowserDoor&) = delete;
   ~BrowserDoor();
 
  private:
-  std::string file_;  // leads to the address, readable by its owner only: a command line would show it to everybody
+  // An HTML file that leads to the address and that only its owner can read. On the browser's command line every user
+  // could see the address.
+  std::string file_;
 };
 
 }  // namespace proxarm::command_line

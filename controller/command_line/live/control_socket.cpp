@@ -43,9 +43,10 @@ using description::SetupError;
 constexpr std::size_t longest_line = 1024;
 constexpr std::size_t most_connections = 16;                     // a person has one or two
 constexpr auto patience = std::chrono::seconds(2);               // with a client that connects and sends nothing
-constexpr auto retry_after = std::chrono::milliseconds(10);      // an obstacle to accept() lasts longer than a call
-constexpr auto time_for_a_line = std::chrono::milliseconds(50);  // from connecting, if descriptors are scarce
-// A live session answers orders and a status in some milliseconds. Changes are checked first, which may take longer.
+constexpr auto retry_after = std::chrono::milliseconds(10);      // time from a failed accept() to the next one
+constexpr auto time_for_a_line = std::chrono::milliseconds(50);  // that a client has if descriptors are scarce
+// How long a client waits for an answer. A running session answers orders and a status within some milliseconds.
+// Changes may take longer, because they are checked first.
 constexpr int answer_within_ms = 5000, status_within_ms = 1000;
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& found, const std::string& expected) {
@@ -62,7 +63,7 @@ void require_own_folder(const fs::path& folder) {
   if ((status.st_mode & 077) != 0) refuse(folder, "a folder that others may enter", "mode 0700");
 }
 
-// Removes the socket of a session that has died; a live session would answer.
+// Removes the socket of a session that has died. Throws SetupError if a running session answers there.
 void remove_stale(const fs::path& path) {
   struct stat status {};
   if (lstat(path.c_str(), &status) != 0) return;
@@ -91,7 +92,7 @@ bool is_owner(stream_protocol::socket& socket) {
 
 namespace {
 
-// A client: one line, one answer.
+// A client's connection, which takes one line and gets one answer.
 struct Connection {
   explicit Connection(boost::asio::io_context& context) : socket(context), timer(context) {}
 
@@ -99,12 +100,13 @@ struct Connection {
   boost::asio::steady_timer timer;
   boost::asio::streambuf line{longest_line};
   std::string answer;
-  std::atomic<bool> closed{false};  // read by the thread of changes
+  std::atomic<bool> closed{false};  // read by the thread that judges changes
   std::chrono::steady_clock::time_point since = std::chrono::steady_clock::now();
 };
 using Client = std::shared_ptr<Connection>;
 
-// An exception becomes an answer: if it left the thread, it would end the session in motion.
+// Returns the answer of a handler. An exception becomes an answer, because an exception that leaves the thread would
+// end the process while the arm moves.
 template <typename Handle>
 std::string answer_of(const Handle& handle) {
   try {
@@ -114,7 +116,7 @@ std::string answer_of(const Handle& handle) {
   }
 }
 
-// Reserved file descriptors, released when the process has no others.
+// Reserved file descriptors, which are released for use when the process has no others left.
 class Reserve {
  public:
   Reserve() {
@@ -131,7 +133,7 @@ class Reserve {
       if (kept < 0) kept = open("/dev/null", O_RDONLY | O_CLOEXEC);
     }
   }
-  // Releases all; returns false if none was reserved.
+  // Releases all reserved descriptors. Returns false if none was reserved.
   bool give() noexcept {
     bool given = false;
     for (int& kept : kept_) {
@@ -146,7 +148,8 @@ class Reserve {
   std::array<int, 4> kept_{};
 };
 
-// Held by the session that listens at `path`. The lock file stays: if it were removed, two sessions could hold it.
+// The lock that the session listening at `path` holds. The lock file is never removed: if it were, two sessions could
+// each lock a file of that name.
 class PathLock {
  public:
   explicit PathLock(const fs::path& path)
@@ -164,8 +167,8 @@ class PathLock {
   int descriptor_;
 };
 
-// Locks the path for this process. A stale socket is removed under the lock, because without it the socket could belong
-// to a session that is just starting.
+// Locks the path for this process. A stale socket is removed only after the path is locked; before, the socket could
+// belong to a session that is just starting.
 std::unique_ptr<PathLock> claim(const fs::path& path) {
   (void)endpoint_of(path);
   require_own_folder(path.parent_path());
@@ -176,7 +179,7 @@ std::unique_ptr<PathLock> claim(const fs::path& path) {
 
 }  // namespace
 
-// Everything except `judge` runs in the thread of `context`.
+// All functions except judge() run in the thread of `context`.
 struct ControlSocket::State {
   State(const fs::path& at, ControlHandlers h) : path(at), handlers(std::move(h)), lock(claim(at)) {}
 
@@ -207,8 +210,9 @@ struct ControlSocket::State {
       accept();
     });
   }
-  // accept() usually fails because it takes a file descriptor before it checks whether a client waits. So a client
-  // being served is ended only if it had time to send its line.
+  // Calls accept() again later, with more file descriptors: the reserved ones, or that of the oldest client. accept()
+  // takes a descriptor before it knows whether a client waits, so it may fail although nobody waits. Therefore the
+  // oldest client's connection is closed only if that client had time to send its line.
   void accept_later() {
     const auto latest = std::chrono::steady_clock::now() - time_for_a_line;
     if (!reserve.give() && !clients.empty() && clients.front()->since < latest) end(clients.front());
@@ -251,7 +255,7 @@ struct ControlSocket::State {
     boost::asio::async_write(client->socket, boost::asio::buffer(client->answer),
                              [this, client](const error_code&, std::size_t) { end(client); });
   }
-  void end(Client client) {  // by value: the argument may be the list's element
+  void end(Client client) {  // by value, because the argument may be an element of `clients`, which erase() changes
     error_code ignored;
     client->closed.store(true);
     client->timer.cancel();
@@ -268,7 +272,8 @@ ControlSocket::ControlSocket(const fs::path& path, ControlHandlers handlers)
   state_->acceptor.open(endpoint.protocol(), error);
   if (!error) state_->acceptor.bind(endpoint, error);
   if (error) refuse(path, error.message(), "a path where a socket can be made");
-  chmod(state_->path.c_str(), 0600);  // nobody else could come here before: only this user may enter the folder
+  // Before this call the socket was safe, too, because only this user may enter the folder.
+  chmod(state_->path.c_str(), 0600);
   state_->acceptor.listen();
   state_->accept();
   state_->judging_thread = std::thread([this] { state_->judging.run(); });
@@ -308,7 +313,8 @@ std::string ask_control_socket(const fs::path& path, const std::string& line) {
   stream_protocol::socket socket(context);
   error_code error;
   socket.open();
-  socket.non_blocking(true);  // a suspended session accepts nobody: its queue fills, and connecting would wait
+  // A suspended session accepts no client. Once its queue is full, a blocking connect() would wait for ever.
+  socket.non_blocking(true);
   socket.connect(endpoint_of(fs::absolute(path)), error);
   if (error == boost::asio::error::would_block || error == boost::asio::error::try_again) throw no_answer(path, 0);
   if (error) {

@@ -30,7 +30,7 @@ struct Live {
   double (*parse)(std::string_view text, std::string_view option);
 };
 
-// The value is a time, or a word such as auto from which choose_horizon() finds a time.
+// Returns whether the text is a change of the lookahead, such as "lookahead=8ms" or "lookahead=auto".
 bool is_lookahead(const std::string& text) { return text.compare(0, 10, "lookahead=") == 0; }
 
 bool is_tool(const std::string& text) {
@@ -74,7 +74,7 @@ double number_of(const std::string& text, const std::string& key, const std::str
   return *value;
 }
 
-// Parses "X,Y,Z".
+// Parses "X,Y,Z". Throws SetupError if a number's size is above `most`.
 std::array<double, 3> three_numbers(const std::string& text, const std::string& key, const std::string& expected,
                                     double most) {
   std::array<double, 3> numbers{};
@@ -140,7 +140,7 @@ void LiveParameters::follow(double period_s) {
   if (period_s != session_.settings.period_s) session_ = with_timestep(session_, named(period_s), period_s);
 }
 
-// Options with the present mass, so that an error names it.
+// Returns the options with the session's present mass, so that an error message names that mass.
 RunOptions LiveParameters::named(double period_s) const {
   RunOptions judged = options_;
   judged.mass_kg = session_.settings.mass_kg;
@@ -205,7 +205,7 @@ controller::Change LiveParameters::take(const std::string& text) {
   }
   choose_horizon(changed);
   RunOptions judged = options_;
-  judged.mass_kg = changed.settings.mass_kg;  // so that the error names it
+  judged.mass_kg = changed.settings.mass_kg;  // so that an error message names this mass
   require_stable(changed, judged);
   session_ = std::move(changed);
   const double handle_kg = parameter.parameter == Parameter::mass ? session_.cell.tool.mass_kg : 0.0;
@@ -293,10 +293,11 @@ struct Script {
 
 struct TimedText {
   double time_s;
-  std::string text, time;  // time: as written
+  std::string text, time;  // time: as the user wrote it
 };
 
-// Parses "mass=3@4s" (after four seconds of rendering) and sorts by time. Throws SetupError.
+// Parses changes with their times, such as "mass=3@4s" (after four seconds of rendering), and sorts them by time.
+// Throws SetupError.
 std::vector<TimedText> timed_texts(const std::vector<std::string>& texts) {
   std::vector<TimedText> timed;
   for (const std::string& text : texts) {
@@ -315,8 +316,8 @@ std::vector<TimedText> timed_texts(const std::vector<std::string>& texts) {
   return timed;
 }
 
-// Calls take() on a change. The refusal may concern another quantity: a new timestep may need a larger mass. So the
-// error names the change and its line, followed by that quantity.
+// Returns take(change). If take() refuses the change, the error that is thrown names the change and its line. The
+// reason may concern another quantity (a new timestep may need a larger mass); then the error names that quantity, too.
 template <typename Take>
 auto taken_from(const std::string& line, const std::string& change, Take take) {
   try {
@@ -348,7 +349,8 @@ Script script_of(const std::vector<std::string>& texts, const PreparedSession& s
   return script;
 }
 
-// Gives an order from the socket to the session; returns the answer. nullopt: the line isn't an order.
+// Passes an order from the socket on to the session, and returns the answer. Returns nullopt if the line isn't an
+// order.
 std::optional<std::string> obey(controller::Cycle& cycle, const std::string& line) {
   const auto command = parse_order(line);
   if (!command) return std::nullopt;
@@ -367,7 +369,7 @@ std::vector<std::string> split_at_tabs(const std::string& line) {
 
 bool is_of_tool(const Change& change) { return change.parameter == Parameter::tool; }
 
-// Makes all changes of a line or, if one is refused, none.
+// Makes all changes of a line, or none if one of them is refused. Throws SetupError if one is refused.
 void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std::vector<std::string>& texts) {
   LiveParameters changed = parameters;
   std::vector<Change> changes;
@@ -377,7 +379,8 @@ void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std:
              "set the others when the drives have confirmed it: what they may be depends on it");
     }
     const Change change = taken_from(text, text, [&](const std::string& one) { return changed.take(one); });
-    // The tool's mass and centre are checked together: the later change holds both, so the earlier one is dropped.
+    // The tool's mass and centre of mass are checked together. The later change of the tool holds both, so an earlier
+    // change of the tool is dropped.
     if (change.parameter == Parameter::tool) std::erase_if(changes, is_of_tool);
     changes.push_back(change);
   }
@@ -391,7 +394,7 @@ void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std:
   parameters = std::move(changed);
 }
 
-// Makes the changes of a line from the socket; returns the answer.
+// Makes the changes of a line from the socket, and returns the answer.
 std::string change(controller::Cycle& cycle, LiveParameters& parameters, const std::string& line) {
   if (cycle.status().changes_timestep() || cycle.status().answered_timesteps() != parameters.asked_timesteps()) {
     refuse(line, "a timestep that is being changed", "a session that has one", "ask again in a moment");
@@ -436,7 +439,7 @@ std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::
     if (scheduled.taken && scheduled.refusal == nullptr) return;
     idle.push_back({change.text, change.time_s, scheduled.taken ? scheduled.refusal : "the session had ended before"});
   };
-  // In the order in which they were scheduled.
+  // timed_texts() returns the changes in the order in which they were scheduled.
   auto next = cycle.scheduled_changes().begin();
   auto next_timestep = cycle.scheduled_timesteps().begin();
   for (const TimedText& change : timed_texts(texts)) {

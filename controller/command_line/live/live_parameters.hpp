@@ -1,7 +1,8 @@
-// Changes the parameters of a running session by text: "mass=3", "damping=20Ns/m", "spring=0"; for an object by its
-// name "wall.friction=0.5", "plate.position_m=0.1,0,0".
+// Changes the parameters of a running session by text, such as "mass=3", "damping=20Ns/m" or "spring=0". A change of an
+// object names the object: "wall.friction=0.5", "plate.position_m=0.1,0,0".
 //
-// Each change is checked as at the start, together with earlier changes. A refused change has no effect.
+// Each change goes through the checks of the session's start, with all earlier changes made. A refused change has no
+// effect.
 #pragma once
 
 #include <memory>
@@ -18,20 +19,23 @@ namespace proxarm::command_line {
 
 class LiveParameters {
  public:
-  // `force_unstable` as in RunOptions. Precondition: `session` outlives this object.
+  // The options' `force_unstable` also allows changes to unstable values.
   LiveParameters(const PreparedSession& session, const RunOptions& options);
 
-  // Throws SetupError.
+  // Makes a change other than of the timestep, and returns it for the session. Throws SetupError if the change is
+  // refused.
   controller::Change take(const std::string& text);
-  // Throws SetupError if the tool has changed since `before` and the sensor's readings contradict the new one.
+  // Throws SetupError if this object's tool differs from the tool of `before`, and the sensor's readings contradict the
+  // new tool.
   void require_tool(const LiveParameters& before, const controller::ToolEvidence& seen) const;
-  // Returns whether the text is like "timestep=2ms".
+  // Returns whether the text is a change of the timestep, such as "timestep=2ms".
   [[nodiscard]] static bool is_timestep(const std::string& text);
-  // Repeats those checks of the start that depend on T. Throws SetupError.
+  // Checks a change of the timestep by all checks of the session's start that depend on T, and returns the new
+  // timestep. Throws SetupError.
   controller::Timestep take_timestep(const std::string& text);
-  // Takes over the session's actual timestep: drives may have refused the last change.
+  // Takes over the session's actual timestep, which differs from the one asked for if a drive refused it.
   void follow(double period_s);
-  // Counts the timesteps that were passed on to the session.
+  // Counts one more timestep that was passed on to the session.
   void count_timestep() noexcept { ++asked_timesteps_; }
   [[nodiscard]] std::uint32_t asked_timesteps() const noexcept { return asked_timesteps_; }
 
@@ -48,19 +52,20 @@ class LiveParameters {
 // Throws SetupError that names `key` if the session takes neither changes nor orders.
 void require_changeable(const PreparedSession& session, const std::string& key);
 
-// Checks the changes of the script and the socket before a bus is opened. Throws SetupError.
+// Checks the options --set, --do and --control before a bus is opened. Throws SetupError.
 void require_changes(const PreparedSession& session, const RunOptions& options);
 
-// A change of the script that had no effect.
+// A change of the script (--set) that had no effect.
 struct IdleChange {
-  std::string text;     // as given, without its time
-  double time_s = 0.0;  // rendering time
+  std::string text;     // the change as the user wrote it, without its time
+  double time_s = 0.0;  // when the change was due, in time of rendering
   const char* refusal;  // why it had no effect
 };
-// Call it after the session; `texts` are the changes in the options.
+// Returns the changes of the script that had no effect. `texts` are the options' changes, with their times. Call this
+// function after the session.
 std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::vector<std::string>& texts);
 
-// Schedules the session's script. Call it before the first cycle; throws SetupError.
+// Schedules the changes and orders of the session's script. Call it before the first cycle; throws SetupError.
 void schedule_changes(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options);
 
 // Returns handlers of orders and changes to the running session, for any thread. They read the session's status from
@@ -68,7 +73,7 @@ void schedule_changes(controller::Cycle& cycle, const PreparedSession& session, 
 ControlHandlers control_handlers(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options,
                                  const controller::BoxReader& box);
 
-// Opens the session's socket if wanted; else returns null.
+// Opens the control socket if the options ask for one; otherwise returns null.
 std::unique_ptr<ControlSocket> control_socket(const RunOptions& options, ControlHandlers handlers);
 
 }  // namespace proxarm::command_line

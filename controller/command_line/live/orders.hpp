@@ -1,5 +1,4 @@
-// The orders that a person may give to a running session, as text: "hold", "resume", "release", "back-off 20mm",
-// "reset".
+// Reads the orders that a person may give to a running session: "hold", "resume", "release", "back-off 20mm", "reset".
 #pragma once
 
 #include <optional>
@@ -12,10 +11,10 @@ namespace proxarm::command_line {
 
 const char* order_name(controller::Order order) noexcept;
 
-// nullopt: the text isn't an order. Throws SetupError for an order with a bad value.
+// Parses one order. Returns nullopt if the text isn't an order. Throws SetupError for an order with a bad value.
 std::optional<controller::Command> parse_order(const std::string& text);
 
-// Parses `--do`, ORDER@TIME, and sorts by time. Throws SetupError.
+// Parses the values of `--do`, each ORDER@TIME, and sorts them by time. Throws SetupError.
 std::vector<controller::ScheduledCommand> scheduled_orders(const std::vector<std::string>& texts);
 
 }  // namespace proxarm::command_line

@@ -19,7 +19,7 @@
 namespace proxarm::command_line {
 namespace {
 
-constexpr int priority = 80;  // above the kernel's threaded interrupts (50), below its watchdogs (99)
+constexpr int priority = 80;  // above the kernel's threaded interrupts (50), below the kernel's watchdogs (99)
 constexpr std::size_t stack_bytes = 256 * 1024;
 
 void missing(const std::string& what, const char* means, const char* helps) {
@@ -33,13 +33,14 @@ std::string first_word(const std::string& file) {
   return word;
 }
 
-// Touches the pages of the stack that the cycle may use, so that none faults during a cycle.
+// Touches the pages of the stack that the cycle may use, so that no page fault happens during a cycle.
 __attribute__((noinline)) void touch_stack() noexcept {
   std::array<volatile char, stack_bytes> room;
   for (std::size_t i = 0; i < room.size(); i += 1024) room[i] = 0;
 }
 
-// Returns the last processor that this process may use, because the first ones get most interrupts.
+// Returns the last processor that this process may use, because the first processors get most interrupts. Returns -1 if
+// the process may use only one.
 int last_processor() noexcept {
   cpu_set_t allowed;
   if (sched_getaffinity(0, sizeof allowed, &allowed) != 0 || CPU_COUNT(&allowed) < 2) return -1;
@@ -92,7 +93,7 @@ RealtimeThread::RealtimeThread() {
   if (!scheduled_) {
     missing(std::string("SCHED_FIFO refused (") + std::strerror(refused) + ")",
             "cycles are late whenever the machine is busy", "grant rtprio in /etc/security/limits.conf");
-    prctl(PR_SET_TIMERSLACK, 1UL);  // else 50 µs
+    prctl(PR_SET_TIMERSLACK, 1UL);  // 1 ns instead of 50 µs
   }
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
     missing(std::string("mlockall refused (") + std::strerror(errno) + ")",
@@ -100,7 +101,9 @@ RealtimeThread::RealtimeThread() {
   }
   touch_stack();
   const int cpu = last_processor();
-  if (scheduled_) pin(cpu);  // without priority, a fixed processor shared with other threads would be worse than moving
+  // A thread without priority isn't pinned: it is better off moving between processors than sharing one with other
+  // threads.
+  if (scheduled_) pin(cpu);
   check_kernel();
   check_governor(cpu);
   sleep_states_ = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);

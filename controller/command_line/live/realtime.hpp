@@ -1,11 +1,12 @@
-// Real-time scheduling for the thread of the cycle, as far as the machine permits.
+// Gives the thread of the cycle real-time scheduling, as far as the machine permits it.
 #pragma once
 
 namespace proxarm::command_line {
 
-// During its lifetime the calling thread runs under SCHED_FIFO on one processor, its stack is touched, the process's
-// memory is locked, and processors don't sleep deeply. A measure that the machine doesn't permit is left out, with a
-// line on standard error that names the effect and a remedy.
+// From its construction to its destruction the calling thread runs under SCHED_FIFO on one processor, and processors
+// don't enter deep sleep states. The constructor also locks the process's memory and touches the thread's stack. Each
+// measure that the machine doesn't permit is left out, with a line on standard error that names the effect and a
+// remedy.
 class RealtimeThread {
  public:
   RealtimeThread();

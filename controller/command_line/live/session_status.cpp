@@ -18,7 +18,7 @@ using controller::Fault;
 using controller::RecordFlag;
 using description::Json;
 
-// The tool's speed is averaged over this many cycles, so that the encoders' steps don't matter.
+// Number of cycles over which the tool's speed is averaged, so that the encoders' steps don't show.
 constexpr std::uint64_t speed_cycles = 20;
 
 struct Status {
@@ -29,9 +29,9 @@ struct Status {
   std::vector<std::string> limits;
 };
 
-// nullopt before the first cycle.
+// Returns the present status; nullopt before the first cycle.
 std::optional<Status> present(const controller::BoxReader& box, const PreparedSession& session) {
-  // A cycle has some kilobytes, too much for this thread's stack.
+  // A BoxCycle has some kilobytes, too much for this thread's stack.
   const auto now = std::make_unique<BoxCycle>(), before = std::make_unique<BoxCycle>();
   Status status;
   status.cycles = box.cycles();

@@ -1,5 +1,5 @@
-// The status of a running session: the answer to "status" on its socket. It is read from the black box's memory while
-// the cycle writes there, so the cycle isn't involved.
+// Returns the status of a running session, which is the answer to "status" on the session's socket. The status is read
+// from the black box's memory while the cycle writes there, so the cycle does no work for it.
 #pragma once
 
 #include <optional>
@@ -10,8 +10,9 @@
 
 namespace proxarm::command_line {
 
-// Answers "status" with a line of JSON, {"version": 1, "phase": "rendering", …}: docs/files.md#the-status-of-a-session;
-// answers "status text" with a line for people. nullopt: the line asks for something else. Any thread may call it.
+// Answers "status" with a line of JSON, {"version": 1, "phase": "rendering", …}
+// (docs/files.md#the-status-of-a-session), and "status text" with a line for people. Returns nullopt if the line asks
+// for something else. Any thread may call this function.
 std::optional<std::string> session_status(const std::string& line, const controller::BoxReader& box,
                                           const PreparedSession& session);
 

@@ -19,7 +19,7 @@
 namespace proxarm::command_line {
 namespace {
 
-// The signals whose default is to end or (SIGTSTP) to suspend the process.
+// Returns the signals that by default end the process or (SIGTSTP) suspend it.
 std::vector<int> ending_signals() {
   std::vector<int> all{SIGHUP,  SIGINT,  SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2,   SIGALRM, SIGVTALRM,
                        SIGPROF, SIGXCPU, SIGXFSZ, SIGPOLL, SIGPWR,  SIGSTKFLT, SIGTSTP};
@@ -30,14 +30,15 @@ constexpr std::array ignored_signals{SIGPIPE, SIGTTIN, SIGTTOU};
 
 constexpr unsigned char end_of_watch = 0;  // no signal has this number
 
-// The handler writes the signal's number here. The handler must be async-signal-safe.
+// The pipe's end to which the signal handler writes the signal's number. It is atomic because the handler must be
+// async-signal-safe.
 std::atomic<int> wake_up{-1};
 static_assert(std::atomic<int>::is_always_lock_free);
 
 extern "C" void note_signal(int signal) {
   const int saved = errno;
   const auto number = static_cast<unsigned char>(signal);
-  // If the pipe is full, an earlier signal has asked for the stop already.
+  // If the pipe is full and the write fails, an earlier signal has already asked for the stop.
   [[maybe_unused]] const ssize_t written = write(wake_up.load(std::memory_order_relaxed), &number, 1);
   errno = saved;
 }
@@ -52,7 +53,8 @@ struct Output {
   EndingCause lost;
 };
 
-// Standard input is watched only if it is a terminal: the end of a pipe isn't a loss.
+// Returns the outputs to watch, and standard input if it is a terminal. Another standard input isn't watched: the end
+// of a pipe isn't a loss.
 std::vector<Output> watched_outputs() {
   std::vector<Output> outputs;
   const EndingCause terminal{"terminal_lost", "the terminal was lost"};
@@ -97,7 +99,8 @@ struct SignalWatch::State {
     on_ending();
   }
 
-  // Watches until end_of_watch. poll() reports errors and hang-ups of the outputs without being asked for events.
+  // Watches until it reads end_of_watch from the pipe. The outputs' requested events are 0: poll() reports errors and
+  // hang-ups unasked.
   void watch() {
     const std::vector<Output> outputs = watched_outputs();
     std::vector<pollfd> polled{{pipe[0], POLLIN, 0}};
@@ -111,7 +114,7 @@ struct SignalWatch::State {
       }
       for (std::size_t i = 0; i < outputs.size(); ++i) {
         if (polled[i + 1].revents == 0) continue;
-        polled[i + 1].fd = -1;  // reported once
+        polled[i + 1].fd = -1;  // so that each loss is reported once
         end(outputs[i].lost);
       }
     }
@@ -142,7 +145,8 @@ SignalWatch::SignalWatch(std::function<void()> on_ending) : state_(std::make_uni
 
 SignalWatch::~SignalWatch() {
   for (const State::Handled& h : state_->handled) sigaction(h.signal, &h.before, nullptr);
-  while (write(state_->pipe[1], &end_of_watch, 1) < 0) {  // the pipe is full of signals, which the thread reads
+  // The write fails while the pipe is full of signals that the thread has yet to read.
+  while (write(state_->pipe[1], &end_of_watch, 1) < 0) {
     if (errno == EAGAIN) std::this_thread::yield();
   }
   state_->thread.join();

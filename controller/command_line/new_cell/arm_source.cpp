@@ -17,12 +17,13 @@ using description::in_quotes;
 using description::SetupError;
 using tinyxml2::XMLElement;
 
-// Distance of the cell's limits from the URDF's, since setpoints overshoot a little.
+// Distance of the cell's limits from the URDF's limits, because setpoints overshoot a little.
 constexpr double range_margin_rad = 0.02, range_margin_m = 0.005;
-// Range of joints without limits ("continuous", or both limits 0): less than a turn to each side.
+// The ends of the range of a joint without limits (a "continuous" one, or one with both limits 0), less than a turn to
+// each side.
 constexpr double unlimited_rad = 3.1, unlimited_m = 1.0;
 
-// Returns an attribute of <limit>; 0 if it is missing.
+// Returns an attribute of the joint's <limit>; 0 if the attribute is missing.
 double limit_of(const UrdfTreeJoint& joint, const XMLElement* limit, const char* name, const fs::path& file) {
   double value = 0.0;
   const auto read = limit->QueryDoubleAttribute(name, &value);
@@ -64,7 +65,7 @@ ChainJoint described(const UrdfTreeJoint& joint, const fs::path& file, std::vect
                       (out.slides ? " m" : " rad") + " are taken");
   }
   const double margin = std::min(out.slides ? range_margin_m : range_margin_rad, 0.05 * (high - low));
-  // More than a turn to each side doesn't help a hand, and slows the search for a start.
+  // A range of more than a turn to each side doesn't help a hand, and slows the search for a start pose.
   const double most = out.slides ? 10.0 : 6.2;
   const auto rounded = [](double x) { return std::round(1e3 * x) / 1e3; };
   out.range = {rounded(std::max(low + margin, -most)), rounded(std::min(high - margin, most))};
@@ -75,7 +76,7 @@ void fix_others(UrdfTree& tree, const UrdfTree::Path& chain, std::vector<std::st
   for (UrdfTreeJoint& joint : tree.joints()) {
     const bool on_chain = std::find(chain.begin(), chain.end(), &joint) != chain.end();
     if (on_chain) continue;
-    // A fixed joint's axis has no meaning, and often is an invalid "0 0 0".
+    // The axis of a fixed joint has no meaning, and is often an invalid "0 0 0".
     while (auto* axis = joint.element->FirstChildElement("axis")) joint.element->DeleteChild(axis);
     if (joint.type == "fixed") continue;
     while (auto* mimic = joint.element->FirstChildElement("mimic")) joint.element->DeleteChild(mimic);
@@ -85,7 +86,8 @@ void fix_others(UrdfTree& tree, const UrdfTree::Path& chain, std::vector<std::st
   }
 }
 
-// Converts "package://NAME/rest" and "file://…" to a path; empty if there is no such file or it can't be drawn.
+// Converts a mesh's name, such as "package://NAME/rest" or "file://…", to a path; empty if there is no such file, or if
+// the mesh can't be drawn.
 std::string mesh_place(const std::string& name, const fs::path& urdf, const Packages& packages) {
   fs::path place = name.starts_with("file://") ? fs::path(name.substr(7)) : fs::path(name);
   if (name.starts_with("package://")) {
@@ -104,7 +106,8 @@ std::string mesh_place(const std::string& name, const fs::path& urdf, const Pack
   return drawn && fs::is_regular_file(place, ignored) ? fs::absolute(place).lexically_normal().string() : "";
 }
 
-// Draws each link by its visuals, or by its collision shapes if the visuals' meshes can't be read (Collada).
+// Gives the meshes of each link's visuals their paths. If these meshes can't be read (Collada), the link's collision
+// shapes are drawn instead.
 void place_shapes(UrdfTree& tree, const fs::path& file, const Packages& packages, std::vector<std::string>& remarks) {
   std::size_t lost = 0;
   for (const auto& named : tree.links()) {

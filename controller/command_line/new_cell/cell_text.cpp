@@ -19,7 +19,8 @@ std::string number(double x) {
   return number;
 }
 
-// A name from a URDF, which may have any characters; quoted if YAML would misread it.
+// Returns a name from a URDF as a YAML scalar. Such a name may have any characters, so it is quoted if YAML could
+// misread it.
 std::string scalar(const std::string& text) {
   const auto plain = [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '/';
@@ -44,7 +45,8 @@ std::string pose(const description::PoseDescription& X) {
 
 using Keys = std::vector<std::pair<std::string, std::string>>;
 
-// Keys that drives usually have in common, and those of their `simulation` maps.
+// These two functions return the keys of a drive, and of its `simulation` map, that the drives of a cell usually have
+// in common.
 Keys common_keys(const description::DriveDescription& d) {
   Keys keys{{"profile", "cia402"}, {"mode", "csp"}};
   if (!d.eds.empty()) keys.emplace_back("eds", scalar(d.eds));
@@ -64,7 +66,7 @@ Keys common_keys(const description::SimulatedDrive& s) {
           {"servo_rate_Hz", number(s.servo_rate_Hz)}};
 }
 
-// Returns the first drive's keys that all other drives have with the same value.
+// Returns those keys of the first drive that all other drives have with the same value. `of` returns a drive's keys.
 template <class Of>
 Keys shared(const std::vector<description::DriveDescription>& drives, Of of) {
   Keys all = of(drives.front());
@@ -92,7 +94,8 @@ std::string in_lines(const std::string& name, const Keys& keys) {
   return text;
 }
 
-// Writes a drive in lines: name and place, what differs from other drives, range, gear, simulation.
+// Returns a drive's lines: its joint, bus and node; the keys in `own`, which differ from the other drives; range; gear;
+// simulation.
 std::string drive_text(const description::DriveDescription& d, const Keys& own, const Keys& simulated) {
   const Keys who{{"joint", scalar(d.joint)}, {"bus", d.bus}, {"node", std::to_string(d.node)}};
   const Keys range{{"range_rad", list(d.range_rad)},

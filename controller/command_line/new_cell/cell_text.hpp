@@ -1,4 +1,4 @@
-// Writes a cell as a file that people read and change.
+// Writes a cell as the text of a file that people will read and change.
 #pragma once
 
 #include <string>
@@ -8,8 +8,9 @@
 
 namespace proxarm::command_line {
 
-// The text has the keys that a new cell needs, with what to look up for a real arm. Files are named relative to the
-// cell. `remarks` become comments at the top.
+// Returns the cell's text. It has the keys that a new cell needs, with comments that say what to look up for a real
+// arm. Files are named relative to the cell. `remarks` become comments at the top. `with_scene`: the cell has a scene
+// of its own. `sensor_keys` are further lines for the section `sensor`.
 std::string cell_text(const description::Cell& cell, const std::vector<std::string>& remarks, bool with_scene,
                       const std::string& sensor_keys);
 

@@ -21,18 +21,19 @@ constexpr int poses = 200;
 constexpr double rotor_share = 0.5, least_rotor_share = 0.03;
 constexpr double gear_Hz = 25.0, stiffest_gear_Hz = 150.0, least_stiffness_share = 0.1, damping_ratio = 0.05;
 constexpr double hand_N = 100.0;
-// A tenth of a drive's torque is for friction and the other joints' motion; links may weigh a fifth more than stated.
+// A tenth of a drive's torque is left for friction and for the motion of other joints. Links may weigh a fifth more
+// than the URDF states.
 constexpr double torque_share = 0.9, weight_margin = 1.2;
-// The largest force that sensor and handle bear, and the smallest that the default hands need.
+// The largest force at the tool that sensor and handle withstand, and the smallest that the default hands need.
 constexpr double most_force_N = 200.0, least_force_N = 60.0;
-// Accelerations divided by the speed, 1/s: the usual one (full speed in a 15th of a second), and the least plausible
-// one.
+// Largest acceleration of a joint divided by its largest speed, 1/s: the usual value (full speed in a 15th of a
+// second), and the smallest plausible value.
 constexpr double usual_per_s = 15.0, least_per_s = 3.0;
 constexpr double fastest_rad_per_s = 4.0, fastest_m_per_s = 1.0, usual_rad_per_s = 2.0, usual_m_per_s = 0.5;
 
 struct Load {
   double mean_inertia = 0.0, most_inertia = 0.0, most_gravity = 0.0;
-  double most_lever = 0.0;  // lever of a force at the tool, m; 1 for a joint that slides
+  double most_lever = 0.0;  // largest lever of a force at the tool, m; 1 for a joint that slides
 };
 
 std::vector<Load> loads_of(const models::Arm& arm) {
@@ -56,21 +57,22 @@ std::vector<Load> loads_of(const models::Arm& arm) {
 
 double squared(double x) { return x * x; }
 
-// The unit of x's second digit: rules of thumb are good for two digits.
+// Returns the unit of x's second significant digit. The rules of thumb are accurate to two digits at most.
 double second_digit(double x) { return std::pow(10.0, std::floor(std::log10(x)) - 1.0); }
 
 double rounded(double x) { return x > 0.0 ? std::round(x / second_digit(x)) * second_digit(x) : 0.0; }
 
 double rounded_down(double x) { return std::floor(x / second_digit(x)) * second_digit(x); }
 
-// The torque that a drive has left while it bears the arm in its worst pose.
+// Returns the torque that a drive has left while it holds the arm's weight in the worst pose.
 double left_Nm(double torque_Nm, const Load& load) {
   return torque_share * torque_Nm - weight_margin * load.most_gravity;
 }
 
-// Refuses arms of kilometres or of a thousand tons, which are mistakes and exceed the range of a cell's keys.
+// Throws SetupError for an arm of kilometres or of a thousand tons. Such an arm is a mistake, and its torque exceeds
+// the range of max_torque_Nm.
 void require_possible(const models::Arm& arm, const description::DriveDescription& drive, const fs::path& urdf) {
-  constexpr double most_Nm = 1e6;  // largest max_torque_Nm in cell files
+  constexpr double most_Nm = 1e6;  // the largest max_torque_Nm that a cell's file may have
   if (drive.max_torque_Nm <= most_Nm) return;
   char found[160];
   std::snprintf(found, sizeof found, "an arm that reaches %.3g m and takes %.3g Nm at joint %.60s",
@@ -82,7 +84,8 @@ void require_possible(const models::Arm& arm, const description::DriveDescriptio
                                            "arm weighs where the URDF doesn't"});
 }
 
-// Chooses the drive's torque, and its acceleration in the worst pose, in which it also bears the arm's weight.
+// Chooses the drive's largest torque, and its largest acceleration, which it must also reach in the pose in which the
+// arm's weight takes most torque.
 void choose_torque(const ChainJoint& joint, const Load& load, double rotor, description::DriveDescription& drive,
                    std::vector<std::string>& remarks) {
   const double inertia = load.most_inertia + rotor, speed = drive.max_speed_rad_per_s;
@@ -123,7 +126,7 @@ std::vector<std::string> size_drives(description::Cell& cell, const std::vector<
   double bears_N = most_force_N;
   std::string weakest;
   const std::vector<Load> loads = loads_of(arm);
-  double heaviest = 0.0;  // of the joints that turn
+  double heaviest = 0.0;  // largest mean inertia of the joints that turn
   for (std::size_t i = 0; i < joints.size(); ++i) {
     if (!joints[i].slides) heaviest = std::max(heaviest, loads[i].mean_inertia);
   }

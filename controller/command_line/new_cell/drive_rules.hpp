@@ -10,21 +10,23 @@
 
 namespace proxarm::command_line {
 
-// Fills in the drives of a cell whose arm can be built, one for each joint, by rules of thumb. I and I' are the mean
-// and the largest inertia that the joint moves over all poses (links and tool); g' is the largest torque of gravity.
-//   rotor      I/2, as motors are matched to their loads; for wrists I isn't below 3 % of the largest I
-//   stiffness  with I alone the gear swings at 25 Hz, which gives arms a first mode of 10 to 16 Hz, as industrial ones
-//              have; for wrists I isn't below a tenth of the largest I, but the link alone swings at 150 Hz at most
-//   damping    a twentieth of the critical damping
-//   torque     the URDF's effort, if nine tenths of it bear 1.2 g' and bring the joint to its speed in a third of a
-//              second; else what 1.2 g' and reaching the speed in a 15th of a second take, plus 100 N of a hand at the
-//              tool, which is nearly all that an arm's light wrist bears
-//   friction   Coulomb 1 % of the torque, viscous 0.8 % at 1 rad/s
-//   speed      the URDF's, at most 4 rad/s
-//   acceleration  what nine tenths of the torque less 1.2 g' give to I' + rotor; at most speed/(1/15 s)
-// Sets limits.max_force_N to the force at the tool that nine tenths of each torque less 1.2 g' hold with the longest
-// lever, between 60 and 200 N. Returns remarks about refused efforts and weak joints, a line each. Throws SetupError,
-// which names the URDF, if the arm is too large or too heavy for any drive.
+// Fills in the drives of a cell whose arm can be built, one drive for each joint, by rules of thumb. I and I' are the
+// mean and the largest inertia of links and tool that the joint moves, over all poses. I_max is the largest I of the
+// joints that turn. g' is the largest torque of gravity over all poses.
+//   rotor         I/2, because motors are matched to their loads; an I below 3 % of I_max (at wrists) counts as 3 %
+//   stiffness     makes the gear swing at 25 Hz with I alone, so that the arm's first mode is at 10 to 16 Hz, as it is
+//                 for industrial arms; an I below a tenth of I_max (at wrists) counts as a tenth, but with the link's
+//                 own I the gear swings at 150 Hz at most
+//   damping       a twentieth of the critical damping
+//   torque        the URDF's effort, if nine tenths of it hold 1.2 g' and bring the joint to its speed in a third of a
+//                 second; otherwise the torque of which nine tenths hold 1.2 g' and bring the joint to its speed in a
+//                 15th of a second, plus the torque of a hand's 100 N at the tool, which is most of a light wrist's
+//   friction      Coulomb 1 % of the torque, viscous 0.8 % of the torque at 1 rad/s
+//   speed         the URDF's, else 2 rad/s; at most 4 rad/s (for a joint that slides: 0.5 m/s and 1 m/s)
+//   acceleration  what nine tenths of the torque less 1.2 g' give to I' + rotor, but at most speed/(1/15 s)
+// Sets limits.max_force_N, between 60 and 200 N, to the force at the tool that each drive can hold on its longest lever
+// with nine tenths of its torque less 1.2 g'. Returns remarks about refused efforts and weak joints, one line each.
+// Throws a SetupError that names the URDF if the arm is too large or too heavy for any drive.
 std::vector<std::string> size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints,
                                      const std::filesystem::path& urdf);
 

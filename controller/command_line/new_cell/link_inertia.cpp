@@ -12,20 +12,24 @@ namespace {
 using models::Vec3;
 using tinyxml2::XMLElement;
 
-// Mass of an arm divided by its reach cubed. Collaborative arms of 1 m have 20 to 30 kg/m³, industrial ones of 2.5 m
-// have 70.
+// Mass of an arm divided by its reach cubed. Collaborative arms with a reach of 1 m have 20 to 30 kg/m³, and industrial
+// arms with 2.5 m have 70 kg/m³.
 constexpr double usual_kg_per_m3 = 40.0;
-// Largest torque of a revolute joint divided by the torque of the stretched arm's weight: 1.4 to 2 where makers state
-// both. An arm isn't heavier than its joints can lift. But efforts are often placeholders, and no arm weighs less than
-// a third of what is usual for its reach.
+// effort_over_weight: the largest effort of a revolute joint, divided by the torque of the stretched arm's weight.
+// Makers that state both have 1.4 to 2. It limits the estimated mass, because an arm isn't heavier than its joints can
+// lift.
+//
+// least_of_usual: a smaller share of the mass that is usual for the reach isn't estimated. No arm weighs less, and
+// efforts are often placeholders.
 constexpr double effort_over_weight = 1.4, least_of_usual = 1.0 / 3.0;
 constexpr double gravity_m_per_s2 = 9.80665;
-constexpr double least_reach_m = 0.1;  // for an arm that only slides, or whose joints are in one place
-// Smaller values are placeholders: a gram, and a gram's moment at 3 mm.
+constexpr double least_reach_m = 0.1;  // reach of an arm that only slides, or whose joints are in one place
+// Values below these are taken for placeholders: a gram, and the moment of a gram at 3 mm.
 constexpr double least_mass_kg = 1e-3, least_moment_kg_m2 = 1e-8;
 
-// What a link's <inertial> states, if it is physical. MuJoCo refuses a principal moment larger than the sum of the
-// other two, which happens when a tensor's numbers are in the wrong places.
+// What a link's <inertial> states physically: nothing, a mass alone, or a mass and an inertia. MuJoCo refuses an
+// inertia with a principal moment larger than the sum of the other two moments. Such an inertia comes about when the
+// tensor's numbers are in the wrong places.
 enum class Inertial { missing, mass_alone, whole };
 Inertial inertial_of(const XMLElement* link) {
   const XMLElement* inertial = link->FirstChildElement("inertial");
@@ -44,7 +48,8 @@ Inertial inertial_of(const XMLElement* link) {
   return of_a_body ? Inertial::whole : Inertial::mass_alone;
 }
 
-// A rod from the link's joint to the next one, with a diameter of a tenth of its length, at least 8 cm.
+// Gives the link the inertia of a rod from the link's joint to the next joint at `to`. The rod's diameter is a tenth of
+// its length, but at least 8 cm.
 void set_rod(XMLElement* link, double mass_kg, const Vec3& to, double least_length_m) {
   while (auto* old = link->FirstChildElement("inertial")) link->DeleteChild(old);
   const double length = std::max(to.norm(), least_length_m), radius = std::max(0.05 * length, 0.04);
@@ -72,13 +77,14 @@ void set_rod(XMLElement* link, double mass_kg, const Vec3& to, double least_leng
   inertia->SetAttribute("izz", number(I(2, 2)).c_str());
 }
 
-// A moving link of the chain, and the next joint's place in it; fixed joints between are included.
+// A link of the chain behind a moving joint, and the place of the next moving joint relative to the link's own joint.
+// Fixed joints between them are included.
 struct MovingLink {
   XMLElement* element;
   Vec3 to_next = Vec3::Zero();
 };
 
-// The largest effort of a joint that turns; 0 if none is stated.
+// Returns the largest effort of a joint that turns; 0 if the URDF states none.
 double strongest_Nm(const UrdfTree::Path& path) {
   double most = 0.0;
   for (const UrdfTreeJoint* joint : path) {
@@ -91,8 +97,8 @@ double strongest_Nm(const UrdfTree::Path& path) {
   return most;
 }
 
-// Estimates the arm's mass m by its reach and its joints' efforts. Stretched, with d_k from the first joint to the
-// middle of link k, the torque of its weight is g m Σ share_k d_k.
+// Estimates the arm's mass m from the reach and the joints' efforts. If the arm is stretched and d_k is the distance
+// from the first joint to the middle of link k, the weight's torque is g m Σ share_k d_k, where the shares add up to 1.
 double estimated_mass_kg(const UrdfTree::Path& path, const std::vector<MovingLink>& moving,
                          const std::vector<double>& share, double shares, double reach_m) {
   const double usual_kg = usual_kg_per_m3 * std::pow(reach_m, 3);
@@ -112,7 +118,7 @@ double estimated_mass_kg(const UrdfTree::Path& path, const std::vector<MovingLin
 void estimate_inertia(UrdfTree& tree, const UrdfTree::Path& path, std::optional<double> said_kg,
                       std::vector<std::string>& remarks) {
   std::vector<MovingLink> moving;
-  double reach_m = 0.0;  // from the first joint on, as a pedestal below it isn't part of the reach
+  double reach_m = 0.0;  // from the first joint on, because a pedestal below that joint isn't part of the reach
   for (const UrdfTreeJoint* joint : path) {
     if (!moving.empty()) {
       reach_m += joint->origin().norm();

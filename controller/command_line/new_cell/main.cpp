@@ -1,6 +1,6 @@
-// The program that `proxarm new-cell` becomes. It is separate because it is used once for an arm.
+// Defines the program that `proxarm new-cell` becomes. It is a separate program because it is used once for an arm.
 //
-// Exit status: 0 fine, 2 set-up mistake.
+// Exit status: 0: fine; 2: set-up mistake.
 #include <CLI/CLI.hpp>
 #include <memory>
 
@@ -22,7 +22,7 @@ void add_options(CLI::App& app, NewCellOptions& options) {
   app.add_option("--package", options.packages, "where a package is that the file names; repeated: more")
       ->type_name("NAME=DIR")
       ->expected(1)
-      ->allow_extra_args(false)  // a xacro's arguments may follow
+      ->allow_extra_args(false)  // because a xacro's arguments may follow
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_option("--out", options.out, "folder for the cell and what it names (default: named after the robot)")
       ->type_name("DIR");

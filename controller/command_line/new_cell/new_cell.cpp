@@ -33,11 +33,12 @@ namespace {
 namespace fs = std::filesystem;
 using description::SetupError;
 
-// Distance of the wall from the start, as the default cell's hand expects it.
+// Distance of the wall from the start. The default cell's hand leads the tool onto a wall at this distance.
 constexpr double wall_ahead_m = 0.2;
-// With a smaller reach, a tenth of the hand's path is already a tenth of all that the tool can reach.
+// An arm with a smaller reach counts as small: for it even a tenth of the hand's path is a tenth of all that the tool
+// can reach.
 constexpr double small_reach_m = 0.25;
-// Factor on the least steady mass: only two hands are tried, and the gears are estimates.
+// Factor on the smallest steady mass, because only two hands are tried, and the gears are estimates.
 constexpr double margin = 1.25;
 
 void write(const fs::path& file, const std::string& text) {
@@ -47,7 +48,7 @@ void write(const fs::path& file, const std::string& text) {
   if (!out) throw SetupError({.file = file.string(), .message = "can't be written"});
 }
 
-// The robot's name as a folder name: characters that shells or paths treat specially become "_".
+// Returns the robot's name as the name of a folder. Characters that shells or paths treat specially become "_".
 std::string folder_name(std::string name) {
   for (char& c : name) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '.') c = '_';
@@ -59,8 +60,8 @@ class NewCell {
  public:
   explicit NewCell(const NewCellOptions& options) : options_(options), source_(read_arm(options)) {
     folder_ = options.out.empty() ? fs::path(folder_name(source_.name)) : options.out;
-    // The cell has this name until it is complete, so that a failed one can be inspected and doesn't block the next
-    // try.
+    // The cell's file has this name until the cell is complete. So a cell that fails can be inspected, and doesn't
+    // block the next try.
     file_ = folder_ / "unfinished-cell.yaml";
     std::error_code ignored;
     if (!options.force && fs::exists(folder_ / "cell.yaml", ignored)) {
@@ -98,7 +99,7 @@ class NewCell {
     choose();
   }
 
-  // The user wrote the arm's file, not the cell that was tried, so errors in that cell name the arm's file.
+  // Returns an error in the cell that was tried as an error in the arm's file, because the user knows only that file.
   [[nodiscard]] SetupError in_terms_of_the_arm(const SetupError& error) const {
     description::SetupProblem problem = error.problem();
     const fs::path mine[] = {file_, folder_ / "arm.urdf", fs::absolute(file_), fs::absolute(folder_ / "arm.urdf")};
@@ -123,7 +124,7 @@ class NewCell {
     }
     fs::copy_file(file, folder_ / "sensor.yaml", fs::copy_options::overwrite_existing);
     if (sensor_.protocol == "ati_net_can_oem") {
-      // Sent before all other frames on a shared bus.
+      // With this base id the sensor's frames are sent before all other frames on a shared bus.
       sensor_keys_ = "  base_id: 0x12\n  sample_rate_Hz: 7147\n  bandwidth_Hz: 800\n";
       return;
     }
@@ -181,8 +182,8 @@ class NewCell {
     cell_.sensor.pose_link.rpy_rad = {rounded(ypr[2]), rounded(ypr[1]), rounded(ypr[0])};
   }
 
-  // Returns the smallest mass that is stable with margins from this start; infinite if there is none or the arm can't
-  // start there. Leaves this start's files and remarks.
+  // Returns the smallest mass that is stable with margins from this start; infinite if there is none, or if the arm
+  // can't start there. The files and remarks of this start stay.
   double least_kg(const StartPose& start, const models::Arm& arm, const models::ToolSpace& space,
                   const description::HandDescription& hand) {
     constexpr double never = std::numeric_limits<double>::infinity();
@@ -198,8 +199,8 @@ class NewCell {
     }
   }
 
-  // Sorts the starts by the mass that they need. Masses within a fifth of one another count as equal; among them the
-  // better pose comes first.
+  // Sorts the starts by least_kg(). Masses that differ by less than about a fifth count as equal; among starts with
+  // equal masses the better pose comes first.
   void sort_by_mass(std::vector<StartPose>& starts, const models::Arm& arm, const models::ToolSpace& space,
                     const description::HandDescription& hand) {
     constexpr double step = 1.2;
@@ -211,7 +212,7 @@ class NewCell {
     for (std::size_t k = 0; k < starts.size(); ++k) starts[k] = judged[k].second;
   }
 
-  // Takes the best start from which the arm is steady.
+  // Chooses the best start from which the arm is steady.
   void choose() {
     constexpr std::size_t judged = 8, most = 3;
     const models::Arm arm(cell_);
@@ -243,7 +244,7 @@ class NewCell {
   }
 
   [[noreturn]] void refuse_without_way(const models::Arm& arm) const {
-    const double reach_m = arm.path_curvature().maxCoeff();  // 1 for an arm with a joint that slides
+    const double reach_m = arm.path_curvature().maxCoeff();  // 1 if a joint slides
     const bool small = reach_m > 0.0 && reach_m < small_reach_m;
     const std::string which =
         small ? "that reaches " + description::rounded_text(reach_m) + " m with its handle, and " : "";
@@ -276,8 +277,8 @@ class NewCell {
     write(folder_ / "scene.yaml", text);
   }
 
-  // Writes a hand for an arm that is too small for the default hand's path of 0.22 m (without any room the hand holds
-  // still), or whose tool moves in a plane or on a line.
+  // Writes a hand for an arm that is too small for the default hand's path of 0.22 m, or whose tool moves only in a
+  // plane or on a line. `share` is the share of the path for which the arm has room; with 0 the hand holds still.
   void write_hand(const description::HandDescription& hand, double share) {
     char text[200], way[80] = "a way that is turned to where the tool can go";
     if (share < 1.0) std::snprintf(way, sizeof way, "%.3g of its way: for that of 0.22 m the arm has no room", share);
@@ -298,10 +299,12 @@ class NewCell {
     cell_.default_hand = folder_ / "hand.yaml";
   }
 
-  // Places the axes in order, equally many on each bus, and fewest on the last one, which has the sensor.
+  // Places the axes on the buses in their order. Each bus has equally many axes, except the last bus, which has the
+  // sensor and fewest axes.
   void place_on_buses(int count) {
     const int axes = static_cast<int>(cell_.drives.size());
-    constexpr double sensor_as_axes = 1.5;  // the sensor's frames are about as long as those of this many drives
+    // The sensor's frames take about as long as those of this many drives.
+    constexpr double sensor_as_axes = 1.5;
     const int each = count == 1 ? axes : static_cast<int>(std::ceil((axes + sensor_as_axes) / count));
     cell_.buses.clear();
     for (int b = 0; b < count; ++b) {
@@ -314,7 +317,8 @@ class NewCell {
     cell_.sensor.bus = cell_.buses.back().name;
   }
 
-  // Returns whether these buses carry this timestep, with the shortest receive window that suffices.
+  // Returns whether this number of buses carries this timestep. Leaves the cell with the shortest receive window that
+  // suffices.
   bool carries(int buses, double period_s) {
     place_on_buses(buses);
     cell_.default_period_s = period_s;
@@ -338,7 +342,8 @@ class NewCell {
                       .expected = "buses that carry a timestep of 10 ms or less"});
   }
 
-  // Tries the hand of the default scene, which moves in a plane, and then free motion in all directions.
+  // Returns the smallest tried mass with which the simulated arm is steady with two hands: the default scene's hand,
+  // which moves in a plane, and a hand that moves freely in all directions. Returns nullopt if no tried mass is.
   std::optional<double> advised_mass() {
     const PreparedSession session = prepare(run_);
     controller::LoopModel loop = led_loop(session);
@@ -366,8 +371,9 @@ class NewCell {
     return advised_mass();
   }
 
-  // A mass that hands lead easily needs no damping. For a larger one, or if none is steady, also tries dampings that a
-  // hand takes for a heavier handle, and keeps the least that saves a quarter of the mass.
+  // Returns advised_mass() with the best damping. If the mass without damping is one that hands lead easily, there is
+  // no damping. Otherwise also tries dampings so small that a hand takes them for a heavier handle, and keeps the
+  // smallest one that saves a quarter of the mass.
   std::optional<double> advised_mass_and_damping() {
     constexpr double easy_kg = 10.0, worth = 0.75;
     const auto without = advised_mass_with(0.0);
@@ -384,9 +390,10 @@ class NewCell {
     return without;
   }
 
-  // If no mass is stable or steady, the arm's gears are too soft for the setpoint filter, so slower filters are tried.
+  // Chooses the mass, the damping and the setpoint filter. If no mass is stable or steady, the arm's gears are too soft
+  // for the filter, so the next slower filter is tried.
   void advise_mass() {
-    std::string with_the_fastest;  // the error with the fastest filter
+    std::string with_the_fastest;  // the advice with the fastest filter
     for (const double bandwidth_Hz : {25.0, 15.0, 10.0}) {
       cell_.limits.setpoint_bandwidth_Hz = bandwidth_Hz;
       const auto mass_kg = advised_mass_and_damping();

@@ -1,7 +1,8 @@
-// `proxarm new-cell`: writes a complete cell for an arm from its URDF or xacro.
+// Runs `proxarm new-cell`, which writes a complete cell for an arm from the arm's URDF or xacro.
 //
-// What the URDF doesn't say is estimated by rules of thumb (drive_rules.hpp, link_inertia.hpp) and marked so in the
-// files. The cell runs at once in simulation; the user replaces the estimates by figures from data sheets.
+// What the URDF doesn't state is estimated by rules of thumb (drive_rules.hpp, link_inertia.hpp), and the estimates are
+// marked in the files. The cell runs at once in simulation. For a real arm the user replaces the estimates by values
+// from data sheets.
 #pragma once
 
 #include <filesystem>
@@ -17,14 +18,14 @@ struct NewCellOptions {
   std::vector<std::string> packages;         // NAME=DIR, for package:// and $(find NAME)
   std::filesystem::path out;                 // folder; empty: named after the robot
   std::string tip;                           // link that carries the sensor; empty: found
-  std::string sensor = "ati_net_can_oem";    // name in models/sensors, or a file
-  std::filesystem::path eds;                 // of the drives; empty: none
-  std::optional<int> buses;                  // unset: as many as 1 ms needs
-  std::optional<double> arm_mass_kg;         // of links without a mass in the file; unset: by the arm's reach
-  bool force = false;                        // overwrite an earlier cell
+  std::string sensor = "ati_net_can_oem";    // name of a sensor in models/sensors, or a file
+  std::filesystem::path eds;                 // EDS or DCF file of the drives; empty: none
+  std::optional<int> buses;                  // number of buses; unset: the fewest for the shortest timestep
+  std::optional<double> arm_mass_kg;  // mass of the arm, for links whose mass the file doesn't state; unset: estimated
+  bool force = false;                 // overwrite a cell that exists
 };
 
-// Returns the exit status. Throws SetupError.
+// Runs the command and returns the exit status. Throws SetupError.
 int new_cell_command(const NewCellOptions& options);
 
 }  // namespace proxarm::command_line

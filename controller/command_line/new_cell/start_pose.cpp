@@ -17,17 +17,22 @@ using models::JointVector;
 using models::Vec3;
 
 constexpr int poses = 20000;
-constexpr std::size_t tried = 2000;  // poses for which the hand's path is tried
-// Step along that path, per metre of reach up to one; shorter than one call of the inverse kinematics can follow.
+constexpr std::size_t tried = 2000;  // number of best poses from which the hand's path is tried
+// Step along the hand's path, as a share of the reach, which counts up to 1 m. One call of the inverse kinematics could
+// follow a longer step.
 constexpr double step_share = 2e-3;
-// Closer to an axis than this the tool counts as on it: turning about the axis doesn't move the tool.
+// Up to this distance from an axis the tool counts as lying on the axis, where turning about the axis doesn't move the
+// tool.
 constexpr double at_an_axis_m = 1e-3;
-// The least reach for which steps are chosen: with a smaller one the path would take thousands of steps.
+// A smaller reach counts as this reach when the step is chosen, because otherwise the path would take thousands of
+// steps.
 constexpr double smallest_circle_m = 0.05;
-constexpr double another_rad = 0.3;  // between two starts; for a joint that slides m, half of a hand's path
-constexpr double least_share = 0.4;  // required share of the start's smallest singular value, anywhere on the path
+constexpr double another_rad = 0.3;  // least difference between two starts; in m for a joint that slides
+// Everywhere on the path, the smallest singular value must be at least this share of its value at the start.
+constexpr double least_share = 0.4;
 
-// Distance of the joint nearest to its end: 0 at an end of its range, 1 in the middle.
+// Returns how far the joint that is nearest to an end of its range is from that end: 0 at the end, 1 in the middle of
+// the range.
 double room(const models::Arm& arm, const JointVector& q) {
   double least = 1.0;
   for (int i = 0; i < arm.axes(); ++i) {
@@ -37,8 +42,8 @@ double room(const models::Arm& arm, const JointVector& q) {
   return least;
 }
 
-// Largest distance of the tool from a revolute axis (m): the stretched length; with prismatic joints the maximum over
-// the sampled poses. 1 m for an arm that only slides.
+// Returns the largest distance of the tool from a revolute axis, in m. For an arm without prismatic joints that is the
+// stretched length; otherwise it is the maximum over the sampled poses. Returns 1 m for an arm that only slides.
 double reach_of(const models::Arm& arm) {
   bool slides = false;
   for (int i = 0; i < arm.axes(); ++i) slides = slides || arm.slides(i);
@@ -54,7 +59,7 @@ double reach_of(const models::Arm& arm) {
   return reach_m > at_an_axis_m ? reach_m : 1.0;
 }
 
-// Removes full turns from joints with a range of more than a turn.
+// Removes full turns from the angles of joints with a range of more than a turn.
 void turn_within_once(const models::Arm& arm, JointVector& q) {
   constexpr double once = 2.0 * std::numbers::pi;
   for (int i = 0; i < arm.axes(); ++i) {
@@ -64,8 +69,8 @@ void turn_within_once(const models::Arm& arm, JointVector& q) {
   }
 }
 
-// Turns an upright first joint so that the tool is straight ahead, where people take hold of an arm. If the joint's
-// range is too narrow, the pose is unchanged.
+// Turns the first joint, if its axis is upright, so that the tool is straight ahead, where people take hold of an arm.
+// If the joint's range is too narrow for that, the pose stays unchanged.
 void turn_ahead(const models::Arm& arm, JointVector& q) {
   constexpr double upright = 0.999;
   const auto first = static_cast<Eigen::Index>(arm.drive_along_chain(0));
@@ -82,8 +87,9 @@ void turn_ahead(const models::Arm& arm, JointVector& q) {
   }
 }
 
-// From 0 to 1, the smaller of two values: σ of the place (place_margin.hpp) over a quarter of the reach, and for a
-// wrist the sine of its middle angle over a half.
+// Returns how well the tool can move, from 0 to 1. It is the smaller of two quotients: σ of the place
+// (place_margin.hpp) divided by a quarter of the reach; and, for an arm with a wrist, the sine of the wrist's middle
+// angle divided by 0.5.
 double dexterity(const models::Arm& arm, const controller::PlaceMargin& places, const JointVector& q, double reach_m) {
   constexpr double well_share = 0.25, well_sine = 0.5;
   models::ToolKinematics at;
@@ -102,16 +108,16 @@ double smallest_singular_value(const models::InverseKinematics& inverse, const m
   return result.smallest_singular_value_m_per_rad;
 }
 
-// The point from which the tool's place is judged: the first joint, but at the height of the floor, z = 0 in W, because
-// arms stand on the floor, hang above it or are bolted to a pedestal. If the floor is out of the arm's reach, the joint
-// itself.
+// Returns the point relative to which the tool's place is judged. It is the first joint's place, moved to the height of
+// the floor, z = 0 in W, because arms stand on the floor, hang above it or are bolted to a pedestal. If the floor is
+// out of the arm's reach, the point is the joint's place itself.
 Vec3 judged_from(const models::ArmPoints& points_W, double reach_m) {
   Vec3 from = points_W.joint_W[0];
   if (std::abs(from.z()) <= reach_m) from.z() = 0.0;
   return from;
 }
 
-// The higher, the better. Dexterity adds at most 2, each other term at most 1.
+// Returns how good a pose is; a larger number is better. Dexterity adds at most 2, and each other term at most 1.
 double score(const models::Arm& arm, const controller::PlaceMargin& places, const JointVector& q, double reach_m) {
   const models::Pose X_WT = arm.tool_pose(q);
   models::ArmPoints points_W;
@@ -130,8 +136,8 @@ double score(const models::Arm& arm, const controller::PlaceMargin& places, cons
   return 2.0 * dexterity(arm, places, q, reach_m) + free + points + ahead - 4.0 * off - 4.0 * below;
 }
 
-// How far the arm follows the hand's path: infinite to its end, else the length that it follows on the first straight
-// piece.
+// Returns how far the arm can follow the hand's path. If the arm can follow the whole path, returns infinity; otherwise
+// returns the length that the arm can follow on the path's first straight piece.
 double gone_m(const models::Arm& arm, models::InverseKinematics inverse, const JointVector& start,
               const description::HandDescription& hand, double step_m) {
   inverse.set_posture(start);
@@ -169,14 +175,15 @@ double first_piece_m(const description::HandDescription& hand) {
   return 0.0;
 }
 
-// A pose and how far the path's first piece could be followed from it. A shorter path whose first piece is longer than
-// that can be skipped.
+// A pose `q`, and the length `most_m` up to which the arm could follow the path's first piece from there. A scaled path
+// whose first piece is longer than `most_m` needn't be tried.
 struct Tried {
   JointVector q;
   double most_m = std::numeric_limits<double>::infinity();
 };
 
-// Poses all over the joints' ranges, the best first; with `ahead`, the first joint is turned straight ahead.
+// Returns the best of the poses all over the joints' ranges, the best first. With `ahead`, the first joint is turned by
+// turn_ahead().
 std::vector<Tried> sorted_poses(const models::Arm& arm, double reach_m, bool ahead) {
   struct Candidate {
     double score;
@@ -189,7 +196,7 @@ std::vector<Tried> sorted_poses(const models::Arm& arm, double reach_m, bool ahe
     JointVector q = models::spread_pose(arm, k);
     if (ahead) turn_ahead(arm, q);
     turn_within_once(arm, q);
-    for (int i = 0; i < arm.axes(); ++i) q[i] = std::round(1e4 * q[i]) / 1e4;  // as the file has it
+    for (int i = 0; i < arm.axes(); ++i) q[i] = std::round(1e4 * q[i]) / 1e4;  // rounded as in the cell's file
     candidates.push_back({score(arm, places, q, reach_m), q});
   }
   std::sort(candidates.begin(), candidates.end(),
@@ -209,7 +216,8 @@ std::vector<StartPose> find_starts(const models::Arm& arm, const description::Ha
     return std::all_of(found.begin(), found.end(),
                        [&](const StartPose& start) { return (start.q - q).cwiseAbs().maxCoeff() > another_rad; });
   };
-  // Straight ahead, and with any first joint. Computed when first needed; one list suffices if the first joint slides.
+  // Two lists of poses: with the first joint turned ahead, and with any angle of the first joint. Each list is computed
+  // when it is first needed. If the first joint slides, there is only one list.
   std::vector<std::vector<Tried>> sorted(arm.slides(arm.drive_along_chain(0)) ? 1 : 2);
   for (const double share : {1.0, 0.5, 0.25, 0.1}) {
     const description::HandDescription shorter = with_shorter_way(hand, share);
@@ -255,7 +263,7 @@ Vec3 outwards_in_sensor(const models::Arm& arm) {
   const Vec3 axis_W = (arm.slides(last) ? tool.J_W.col(last).head<3>() : tool.J_W.col(last).tail<3>()).normalized();
   models::ArmPoints points;
   arm.points(q, points);
-  // From the nearest earlier joint that isn't on this axis.
+  // `along` is the sensor's distance along the axis from the nearest joint with a distance that isn't 0.
   double along = 0.0;
   for (int i = arm.axes() - 1; i >= 0 && std::abs(along) < 1e-3; --i) {
     along = axis_W.dot(tool.X_WS.translation() - points.joint_W[static_cast<std::size_t>(i)]);

@@ -18,10 +18,10 @@ using tinyxml2::XMLElement;
 
 namespace {
 
-constexpr std::size_t most_joints = 1000;  // searches in the tree take the square of it, and recurse as deep
+constexpr std::size_t most_joints = 1000;  // the time of searches grows with its square, the depth of recursion with it
 
-// Attributes that must be finite numbers if present. Invalid masses and inertias are estimated instead
-// (link_inertia.hpp).
+// Attributes that must be finite numbers if they are there. Masses and inertias aren't among them, because invalid ones
+// are replaced by estimates (link_inertia.hpp).
 struct Numbers {
   const char *element, *attribute;
   int count;
@@ -53,15 +53,15 @@ std::string text_of(const XMLElement* element, const char* name) {
 
 namespace {
 
-// The attribute xyz of a joint's <origin> or <axis>; the format's default if it is missing.
+// Returns the attribute xyz of a joint's <origin> or <axis>; the default `otherwise` if the attribute is missing.
 Vec3 vector_of(const XMLElement* element, const Vec3& otherwise) {
   std::istringstream in(text_of(element, "xyz"));
   double x = 0.0, y = 0.0, z = 0.0;
   return in >> x >> y >> z ? Vec3(x, y, z) : otherwise;
 }
 
-// Replaces processing instructions by blanks, so that line numbers stay. XML permits them anywhere, tinyxml2 only at
-// the beginning.
+// Replaces processing instructions by blanks, so that line numbers stay. XML permits such instructions anywhere, but
+// tinyxml2 permits them only at the beginning.
 std::string without_instructions(std::string xml) {
   const auto end_of = [&](std::size_t from, const char* mark) {
     const std::size_t found = xml.find(mark, from);
@@ -110,7 +110,8 @@ SetupError UrdfTree::mistake(const XMLElement* where, std::string message) const
   return SetupError({.file = file_.string(), .line = where->GetLineNum(), .message = std::move(message)});
 }
 
-// Recurses at most 500 deep, as tinyxml2 refuses files that are nested deeper.
+// Throws SetupError for an invalid number in the element or below it. The recursion is at most 500 calls deep, as
+// tinyxml2 refuses files that are nested deeper.
 void UrdfTree::require_numbers(const XMLElement* element) const {
   for (const Numbers& one : numbers) {
     const char* text = std::strcmp(element->Name(), one.element) == 0 ? element->Attribute(one.attribute) : nullptr;
@@ -131,7 +132,8 @@ void UrdfTree::add_link(XMLElement* element) {
   if (!links_.emplace(name, element).second) throw mistake(element, "a second link named " + in_quotes(name));
 }
 
-// No link has two joints above it, so all that the root reaches is a tree, and every search in it ends.
+// Adds a joint. Throws SetupError if its child link already has a joint above it: so the links below the root form a
+// tree, and every search in the tree ends.
 void UrdfTree::add_joint(XMLElement* element) {
   require_numbers(element);
   UrdfTreeJoint joint{element,
@@ -223,12 +225,14 @@ std::string UrdfTree::found_tip() const {
       if (joints > most) way = joint;
       most = std::max(most, joints);
     }
-    // The end, or where fingers or a second arm begin. A side branch such as a balancer is shorter than the arm.
+    // Stops where no joint moves beyond, or where fingers or a second arm begin. A side branch such as a balancer
+    // doesn't stop the search, because it has at least two moving joints fewer than the arm.
     if (way == nullptr || (second > 0 && most < second + 2)) break;
     at = way->child;
     if (way->moves()) last_moved = at;
   }
-  // Of the links fixed to the last moving one, takes the one with the best of these names.
+  // Of the links that are fixed to the last moving link, returns the one whose name ends with the earliest possible
+  // name of this list.
   std::vector<std::string> fixed{last_moved};
   for (std::size_t k = 0; k < fixed.size(); ++k) {
     for (const UrdfTreeJoint* joint : below(fixed[k])) {

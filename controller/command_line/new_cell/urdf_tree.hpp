@@ -1,4 +1,4 @@
-// The tree of links and joints in a URDF, to find the chain to the sensor.
+// Reads the tree of links and joints in a URDF, and finds the chain to the sensor.
 #pragma once
 
 #include <tinyxml2.h>
@@ -13,7 +13,7 @@
 
 namespace proxarm::command_line {
 
-// Empty if the element or attribute is missing.
+// Returns the element's attribute `name`; empty if the element or the attribute is missing.
 std::string text_of(const tinyxml2::XMLElement* element, const char* name);
 
 struct UrdfTreeJoint {
@@ -22,7 +22,7 @@ struct UrdfTreeJoint {
   bool mimic = false;
   [[nodiscard]] bool moves() const { return !mimic && (turns() || type == "prismatic"); }
   [[nodiscard]] bool turns() const { return type == "revolute" || type == "continuous"; }
-  [[nodiscard]] models::Vec3 origin() const;  // in the parent's link
+  [[nodiscard]] models::Vec3 origin() const;  // in the frame of the parent link
   [[nodiscard]] models::Vec3 axis() const;    // not normalized
 };
 
@@ -30,7 +30,7 @@ class UrdfTree {
  public:
   using Path = std::vector<const UrdfTreeJoint*>;
 
-  // `file` is for messages. Throws SetupError with the file's line.
+  // Reads the URDF's text `xml`. `file` is named in error messages. Throws SetupError with the line in the file.
   UrdfTree(const std::filesystem::path& file, const std::string& xml);
 
   [[nodiscard]] tinyxml2::XMLElement* robot() const { return robot_; }
@@ -39,10 +39,10 @@ class UrdfTree {
   [[nodiscard]] const std::map<std::string, tinyxml2::XMLElement*>& links() const { return links_; }
   [[nodiscard]] const std::string& root() const { return root_; }
 
-  // The joints from the root to that link. Throws if there is no such link.
+  // Returns the joints from the root to that link. Throws SetupError if there is no such link.
   [[nodiscard]] Path path_to(const std::string& link) const;
-  // The link for the sensor if the user named none: where the moving joints end or branch, and among the links fixed
-  // there the one with a usual name.
+  // Returns the link for the sensor if the user named none. It is the link where the moving joints end or branch, or,
+  // if one of the links fixed to that link has a usual name, such as tool0, the fixed link.
   [[nodiscard]] std::string found_tip() const;
 
  private:
@@ -51,8 +51,8 @@ class UrdfTree {
   void add_joint(tinyxml2::XMLElement* element);
   void find_root();
   [[nodiscard]] Path below(const std::string& link) const;
-  // The largest number of moving joints in a row from this one on, itself included; mimic joints (a gripper's second
-  // finger) count.
+  // Returns the largest number of moving joints on a path that begins with this joint. This joint and mimic joints (a
+  // gripper's second finger) count, too.
   [[nodiscard]] int motion_beyond(const UrdfTreeJoint& joint) const;
   [[nodiscard]] description::SetupError mistake(const tinyxml2::XMLElement* where, std::string message) const;
 

@@ -23,7 +23,7 @@ using description::SetupError;
 
 constexpr std::size_t most_bytes = std::size_t{16} << 20;
 
-// Returns the name of the package whose folder this is; empty if it isn't a package.
+// Returns the name of the package in this folder; empty if the folder isn't a package's.
 std::string package_in(const fs::path& folder) {
   std::ifstream in(folder / "package.xml");
   if (!in) return "";
@@ -46,7 +46,7 @@ std::vector<fs::path> folders_in(const char* variable) {
   return folders;
 }
 
-// A temporary folder with the packages as ROS 2 looks for them, removed with the object.
+// A temporary folder in which ROS 2 finds the packages. The destructor removes the folder.
 class PackageIndex {
  public:
   explicit PackageIndex(const Packages& packages) {
@@ -65,7 +65,7 @@ class PackageIndex {
   PackageIndex& operator=(const PackageIndex&) = delete;
   ~PackageIndex() {
     std::error_code ignored;
-    fs::remove_all(folder_, ignored);  // links, not their targets
+    fs::remove_all(folder_, ignored);  // removes the links in it, not their targets
   }
   [[nodiscard]] const fs::path& folder() const noexcept { return folder_; }
 
@@ -78,7 +78,7 @@ void prepend(const char* variable, const std::string& value) {
   ::setenv(variable, (value + (old != nullptr && *old != '\0' ? ":" + std::string(old) : "")).c_str(), 1);
 }
 
-// Runs in the child: standard output goes to `out`, standard error to a file.
+// Replaces the child process by xacro. Its standard output goes to `out`, and its standard error to the file `errors`.
 [[noreturn]] void become_xacro(const std::vector<std::string>& words, int out, const fs::path& errors) {
   ::dup2(out, STDOUT_FILENO);
   const int said = ::open(errors.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
@@ -111,7 +111,8 @@ std::string contents_of(const fs::path& file) {
 
 Packages::Packages(const std::vector<std::string>& given, const fs::path& urdf) {
   std::error_code error;
-  // The last entry of a name counts: first the neighbours of the URDF's package, then the environment, then --package.
+  // A later entry replaces an earlier entry of the same name. First come the packages beside the URDF's package, then
+  // those of the environment, then those of --package.
   for (fs::path folder = fs::absolute(urdf).parent_path(); folder.has_relative_path(); folder = folder.parent_path()) {
     if (!fs::exists(folder / "package.xml", error)) continue;
     for (const auto& beside : fs::directory_iterator(folder.parent_path(), error)) {

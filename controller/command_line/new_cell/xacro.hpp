@@ -1,4 +1,4 @@
-// Resolves what URDFs for ROS refer to: packages, and macros that the program xacro expands.
+// Finds the packages to which URDFs for ROS refer, and expands macros by the program xacro.
 #pragma once
 
 #include <filesystem>
@@ -8,13 +8,14 @@
 
 namespace proxarm::command_line {
 
-// Finds ROS packages: as given by --package NAME=DIR, in the folders of ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, or the
-// URDF's own package and its neighbours.
+// Knows the folders of ROS packages: those given by --package NAME=DIR, those in the folders of ROS_PACKAGE_PATH and
+// AMENT_PREFIX_PATH, and the URDF's own package with the packages beside it.
 class Packages {
  public:
-  // Throws SetupError for words that aren't NAME=DIR, and for missing folders.
+  // Finds the packages. `given` are the values of --package. Throws SetupError for a value that isn't NAME=DIR, and for
+  // a missing folder.
   Packages(const std::vector<std::string>& given, const std::filesystem::path& urdf);
-  // Empty: unknown package.
+  // Returns a package's folder; empty if the package is unknown.
   [[nodiscard]] std::filesystem::path folder(const std::string& name) const;
   [[nodiscard]] const std::map<std::string, std::filesystem::path>& all() const noexcept { return known_; }
 
@@ -22,8 +23,9 @@ class Packages {
   std::map<std::string, std::filesystem::path> known_;
 };
 
-// Returns the URDF's text: the file's own, or the output of `xacro FILE NAME:=VALUE …`. xacro must be on the PATH; it
-// finds the packages as in ROS 1 and ROS 2. Throws SetupError with xacro's error.
+// Returns the URDF's text: the file's content, or for a xacro the output of `xacro FILE NAME:=VALUE …`. The program
+// xacro must be on the PATH, and finds the packages as it does in ROS 1 and ROS 2. Throws SetupError with xacro's
+// error.
 std::string urdf_text(const std::filesystem::path& file, const std::vector<std::string>& arguments,
                       const Packages& packages);
 

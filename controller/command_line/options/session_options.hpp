@@ -21,7 +21,7 @@ void add_without_enabling(CLI::App& app, RunOptions& options);
 void add_hardware_option(CLI::App& app, RunOptions& options);
 void add_view_options(CLI::App& app, RunOptions& options, const char* what);
 
-// A command doesn't offer options that have no effect on it.
+// Removes options from a command on which they would have no effect.
 void leave_out(CLI::App& app, std::initializer_list<const char*> options);
 
 }  // namespace proxarm::command_line

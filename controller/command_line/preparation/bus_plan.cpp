@@ -25,7 +25,7 @@ using fieldbus::PlannedFrame;
 
 std::int64_t period_ns(const PreparedSession& session) { return std::llround(session.settings.period_s * 1e9); }
 
-// The period, in cycles, of a frame that comes every `ms` milliseconds.
+// Returns the period, in cycles, of a frame that is sent every `ms` milliseconds.
 int cycles_of(const PreparedSession& session, int ms) {
   return std::max(1, static_cast<int>(std::int64_t{ms} * 1'000'000 / period_ns(session)));
 }
@@ -38,7 +38,7 @@ void add_sync(PlannedBus& bus) {
   bus.frames.push_back(sync);
 }
 
-// The heartbeat is queued after all setpoints.
+// Adds the controller's heartbeat, which is queued after all setpoints.
 void add_heartbeat(PlannedBus& bus, const PreparedSession& session) {
   fieldbus::DriveSettings drive;
   drive.stop_without_controller(session.cell.supervision.bus_loss_stop_s);
@@ -51,7 +51,8 @@ void add_heartbeat(PlannedBus& bus, const PreparedSession& session) {
   bus.frames.push_back(heartbeat);
 }
 
-// Life guarding: a request without data and its answer, as often as the heartbeat and sent after it.
+// Adds the frames of a drive's life guarding: the request without data, and the answer. The request is sent after each
+// heartbeat.
 void add_guarding(PlannedBus& bus, const PlannedFrame& heartbeat, const description::DriveDescription& drive) {
   if (drive.bring_up.stops_by != description::StopsBy::life_guarding) return;
   PlannedFrame frame = heartbeat;
@@ -66,11 +67,11 @@ void add_guarding(PlannedBus& bus, const PlannedFrame& heartbeat, const descript
   bus.frames.push_back(frame);
 }
 
-// Typical contents of frames: drives enabled and within 0.2 rad of the start pose, a hand that pushes with 10 N and 1
-// Nm.
+// Typical contents of frames: the drives are enabled and within 0.2 rad of the start pose, and a hand pushes with up to
+// 10 N and 1 Nm along each axis.
 constexpr int typical_samples = 256;
 constexpr double typical_motion_rad = 0.2, typical_force_N = 10.0, typical_torque_Nm = 1.0;
-// From a poll to the sensor's answer, as simulated sensors take it. Makers don't state this time.
+// Time from a poll to the sensor's answer. Makers don't state it, so this is the time that simulated sensors take.
 constexpr std::int64_t answer_time_ns = sim::DescribedDeviceConfig{}.answer_time_ns;
 constexpr std::uint16_t typical_controlword = 0x000F, typical_statusword = 0x1237;
 
@@ -100,7 +101,7 @@ class TypicalPdos {
     if (mapped.object == fieldbus::object_address(drive_.objects.controlword)) return typical_controlword;
     if (mapped.object == fieldbus::object_address(drive_.objects.statusword)) return typical_statusword;
     if (mapped.bits == 16) return static_cast<std::uint32_t>(std::lround(100.0 * around_(random_)));  // a torque
-    // Some joints move far, others hardly, so the motions have all orders of magnitude down to a count.
+    // Some joints move far, others hardly, so the sizes of the motions have all orders of magnitude down to one count.
     const double reach_rad = typical_motion_rad * std::pow(10.0, -7.0 * std::abs(around_(random_)));
     return static_cast<std::uint32_t>(scale_.counts(start_rad_ + reach_rad * around_(random_)).value_or(0));
   }
@@ -112,7 +113,7 @@ class TypicalPdos {
   std::uniform_real_distribution<double> around_{-1.0, 1.0};
 };
 
-// The frames of a described sensor's samples under a push.
+// Makes the frames that a described sensor sends for samples of a random push.
 class TypicalSensor final : private sim::WrenchSource, private sim::DevicePort {
  public:
   std::vector<fieldbus::CanFrame> operator()(const description::SensorDescription& sensor, std::uint32_t base_id) {
@@ -166,7 +167,8 @@ void add_drive(PlannedBus& bus, const PreparedSession& session, std::size_t axis
   for (const PlannedFrame& frame : {feedback, target}) bus.frames.push_back(frame);
 }
 
-// The frame's last six bytes hold gauges first, first + 2 and first + 4: the bias plus a random push and noise.
+// Returns frames with typical gauges. A frame's last six bytes hold the gauges `first`, `first` + 2 and `first` + 4,
+// each with its bias plus a random push and noise.
 std::vector<fieldbus::CanFrame> typical_gauges(const PreparedSession& session, PlannedFrame frame, std::size_t first) {
   std::mt19937 random(1);
   std::uniform_int_distribution<int> around(-500, 500);
@@ -185,7 +187,8 @@ std::vector<fieldbus::CanFrame> typical_gauges(const PreparedSession& session, P
   return frames;
 }
 
-// The enabling input is in TPDO2 of its drive, or in a message that comes at least twice before it is too old.
+// Adds the frame of the enabling input. The frame is TPDO2 of the input's drive, or a message that is sent at least
+// twice within timeout_s.
 void add_enabling_input(PlannedBus& bus, const PreparedSession& session) {
   const description::EnablingInputDescription& input = *session.cell.enabling_input;
   PlannedFrame frame{.name = "enabling input", .id = input.identifier};
@@ -204,7 +207,7 @@ void add_enabling_input(PlannedBus& bus, const PreparedSession& session) {
     frame.any_time = true;
     frame.every_cycles = cycles_of(session, std::max(1, static_cast<int>(500.0 * input.timeout_s)));
   }
-  // Typical content: pressed, all other bits 0.
+  // Typical content: the switch is pressed, and all other bits are 0.
   fieldbus::CanFrame usual;
   usual.id = frame.id;
   usual.extended = frame.shape.extended;
@@ -215,7 +218,7 @@ void add_enabling_input(PlannedBus& bus, const PreparedSession& session) {
   bus.frames.push_back(frame);
 }
 
-// ATI Net CAN OEM: a poll and two answers.
+// Adds the frames of an ATI Net CAN OEM sensor: a poll and two answers.
 void add_sensor(PlannedBus& bus, const PreparedSession& session) {
   const std::uint32_t base = session.cell.sensor.base_id << 4;
   PlannedFrame poll{.name = "sensor poll", .id = base};
@@ -248,8 +251,8 @@ PlannedFrame described_frame(const description::SensorProtocol& protocol, std::u
   return frame;
 }
 
-// A polled sensor answers within the receive window. A streaming sensor has its own clock, independent of the timestep.
-// The frames of a sample follow one another.
+// Adds the frames of a described sensor. A polled sensor must answer within the receive window. A streaming sensor
+// sends by its own clock, independent of the timestep. The frames of one sample follow one another.
 void add_described_sensor(PlannedBus& bus, const PreparedSession& session) {
   const description::SensorProtocol& protocol = *session.sensor.described;
   const std::uint32_t base_id = session.cell.sensor.base_id;
@@ -285,7 +288,8 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
     if (indices[i] != index) continue;
     const description::BusDescription& own = session.cell.buses[i];
     bus.name += (bus.name.empty() ? "" : "+") + own.name;
-    // Buses that share an interface take the slowest of their rates; one classic bus makes the interface classic.
+    // Buses that share an interface get the lowest of their bitrates. If one of these buses is classic CAN, its data
+    // bitrate of 0 makes the interface classic.
     bus.data_bitrate = bus.bitrate == 0 ? own.data_bitrate : std::min(bus.data_bitrate, own.data_bitrate);
     bus.bitrate = bus.bitrate == 0 ? own.bitrate : std::min(bus.bitrate, own.bitrate);
     const auto on_it = [&](const description::DriveDescription& d) { return d.bus == own.name; };
@@ -320,9 +324,9 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
   return bus;
 }
 
-// ---- Keys of the cell that would let a late sensor arrive in time
+// ---- Finding keys of the cell with which the frames of a late sensor would arrive in time
 
-// Plans one bus of the network, for a given session or for a variant of it.
+// Plans one bus of the network for any variant of a session.
 class PlaceOfBus {
  public:
   PlaceOfBus(const controller::BusIndices& indices, std::size_t index) : indices_(indices), index_(index) {}
@@ -350,10 +354,10 @@ class PlaceOfBus {
   std::size_t index_;
 };
 
-// Returns the nearest free base_id below the sensor's with which all frames fit; nullopt if there is none, or if the
-// sensor has no base id.
+// Returns the largest free base_id below the sensor's present one with which all frames arrive in time. Returns nullopt
+// if there is none, or if the sensor has no base id.
 std::optional<std::uint32_t> lower_base_id(PreparedSession session, const PlaceOfBus& place) {
-  constexpr std::uint32_t tries = 128;  // an ATI sensor has no more base ids
+  constexpr std::uint32_t tries = 128;  // the number of an ATI sensor's base ids
   if (session.sensor.described && !session.sensor.described->has_base_id) return std::nullopt;
   const std::uint32_t least = session.sensor.described ? session.sensor.described->base_id_min : 0;
   std::uint32_t& base_id = session.cell.sensor.base_id;
@@ -364,7 +368,8 @@ std::optional<std::uint32_t> lower_base_id(PreparedSession session, const PlaceO
   return std::nullopt;
 }
 
-// Returns the shortest receive_window above the session's with which all frames fit, in twentieths of the timestep.
+// Returns the shortest receive_window above the session's with which all frames arrive in time; nullopt if there is
+// none. Tries multiples of a twentieth of the timestep.
 std::optional<double> longer_window(PreparedSession session, const PlaceOfBus& place) {
   constexpr int steps = 20, longest = 16;  // the key's range ends at 0.8
   for (int n = 1; n <= longest; ++n) {
@@ -376,7 +381,8 @@ std::optional<double> longer_window(PreparedSession session, const PlaceOfBus& p
   return std::nullopt;
 }
 
-// Adds these two remedies if the frames fit into the cycle but arrive too late.
+// Adds a lower base_id and a longer receive_window to the plan's remedies, if all frames fit into the cycle but some
+// arrive too late.
 void add_ways_of_the_cell(const PreparedSession& session, const PlaceOfBus& place, fieldbus::BusPlan& plan) {
   if (plan.fits || plan.worst_ns > plan.period_ns || !place.has_sensor(session.cell)) return;
   std::vector<std::string> ways;

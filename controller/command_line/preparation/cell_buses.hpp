@@ -1,4 +1,4 @@
-// Converts the buses of a cell to what the networks take.
+// Converts the buses of a cell to the names and indices that networks take.
 #pragma once
 
 #include <string>
@@ -12,13 +12,14 @@ namespace proxarm::command_line {
 
 std::vector<std::string> bus_names(const description::Cell& cell);
 
-// For a network that has the cell's buses in the same order.
+// Returns the indices for a network that has the same buses as the cell, in the same order.
 controller::BusIndices buses_in_order(const description::Cell& cell);
 
-// For a network on these interfaces, one for each bus of the cell. Buses on one interface share its wire.
+// Returns the indices for a network on these interfaces. `interfaces` has one interface for each bus of the cell; buses
+// on one interface have the same index.
 controller::BusIndices indices_of(const std::vector<std::string>& interfaces);
 
-// Throws SetupError if a bus with a data bitrate is on an interface that is set up for classic CAN.
+// Throws SetupError if a bus of the cell with a data bitrate is on an interface that is set up for classic CAN.
 void require_fd(const description::Cell& cell, fieldbus::SocketCanNetwork& network);
 
 }  // namespace proxarm::command_line

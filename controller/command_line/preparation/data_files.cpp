@@ -11,7 +11,8 @@ fs::path shipped_file(const std::string& relative) {
   const fs::path executable = fs::read_symlink("/proc/self/exe", ignored);
   const fs::path installed = executable.parent_path().parent_path() / "share" / "proxarm" / relative;
   if (fs::exists(installed, ignored)) return installed;
-  // A user's own program that links the installed libraries lies elsewhere.
+  // A user's own program that links the installed libraries isn't beside share/proxarm, so it uses the path known at
+  // build time.
   const fs::path source = fs::path(PROXARM_SOURCE_DIR) / relative;
   if (fs::exists(source, ignored)) return source;
   // Where `cmake --install` was configured to put them, and where Debian's packages do.

@@ -9,7 +9,7 @@ namespace {
 
 using description::number_text;
 
-// File names only: a record must not depend on where the files are.
+// Returns a file's name without its folder, because a record must not depend on where the files are.
 std::string name_of(const std::filesystem::path& file) { return file.filename().string(); }
 
 void number(YAML::Emitter& out, const char* key, double value) {

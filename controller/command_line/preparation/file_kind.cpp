@@ -89,7 +89,7 @@ FileKind kind_of(const fs::path& file) {
   if (!fs::is_regular_file(file, ignored)) return FileKind::unknown;
   try {
     return kind_of_yaml(description::YamlNode::load(file));
-  } catch (const description::SetupError&) {  // the file's loader reports the error with its line
+  } catch (const description::SetupError&) {  // the file's loader will report the error with its line
   }
   return FileKind::unknown;
 }

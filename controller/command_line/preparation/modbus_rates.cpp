@@ -12,7 +12,8 @@
 namespace proxarm::command_line {
 namespace {
 
-// A setpoint waits for the next exchange, half an exchange on average, and is reached one exchange later.
+// Delay of a setpoint on Modbus, in exchanges. A setpoint waits half an exchange on average for the next exchange, and
+// is reached one exchange later.
 constexpr double exchanges_late = 1.5;
 
 void warn_if_unstable(const PreparedSession& session, const std::string& joint, double rate_Hz) {
@@ -57,7 +58,7 @@ std::vector<DriveOnLine> drives_on(const description::Cell& cell, const descript
   return drives;
 }
 
-// The number of drives on the line, plus the sensor. They take turns.
+// Returns the number of devices that take turns on the line: its drives, and the sensor if it is on this line.
 int devices_on(const description::Cell& cell, const description::ModbusLineDescription& line) {
   return static_cast<int>(drives_on(cell, line).size()) + (cell.sensor.bus == line.name ? 1 : 0);
 }

@@ -1,4 +1,5 @@
-// Reports the rates of Modbus lines before the motion, and whether a hand can be coupled through such slow axes.
+// Reports the rates of Modbus lines before the arm moves, and warns if the loop with the hand isn't stable through axes
+// that slow.
 #pragma once
 
 #include <string>
@@ -8,15 +9,16 @@
 
 namespace proxarm::command_line {
 
-// Prints the measured rate of each drive on Modbus on standard error. Also prints a warning with the arithmetic if the
-// loop with the hand isn't stable at the wanted mass, judged as if all motion went through that axis.
+// Prints the measured rate of each drive on Modbus on standard error. If the loop with the hand isn't stable at the
+// session's mass, also prints a warning with the arithmetic. Stability is judged as if all motion went through that
+// drive's axis.
 void report_modbus_rates(const PreparedSession& session, const controller::CycleParts& parts);
 
-// The expected rate of the joint that reports its position least often, 1/s; 0: no drive is on Modbus.
+// Returns the expected rate of the drive that reports its position least often, in 1/s; 0 if no drive is on Modbus.
 double slowest_report_Hz(const description::Cell& cell);
 
-// Returns the expected rates of the cell's Modbus lines: a few lines of text each, with the arithmetic for serial
-// lines. Prints the same warning on standard error. Asks no device.
+// Returns a text with the expected rates on each Modbus line of the cell, with the arithmetic if the line is serial.
+// Prints the warning of report_modbus_rates() on standard error, for the expected rates. Asks no device.
 std::string modbus_plan_text(const PreparedSession& session);
 
 }  // namespace proxarm::command_line

@@ -38,8 +38,8 @@ fs::path beside(const fs::path& file, const std::string& relative) {
   return (file.parent_path() / relative).lexically_normal();
 }
 
-// Loads a file that the user may have named. If it is of another kind, the error says so, instead of naming the first
-// key that the loader doesn't know.
+// Loads a file that the user may have named. If the file is of another kind, the error says so, instead of naming the
+// first key that the loader doesn't know.
 template <typename Load>
 auto loaded(const fs::path& file, FileKind kind, const Load& load) {
   try {
@@ -50,7 +50,8 @@ auto loaded(const fs::path& file, FileKind kind, const Load& load) {
   }
 }
 
-// Reports a missing file with its option, because giving a number instead of a file is a common slip.
+// Throws SetupError if `given` is missing. The error names the option, because users often give a number instead of a
+// file.
 void require_file(const fs::path& given, const char* option, const char* example) {
   std::error_code ignored;
   if (given.empty() || fs::exists(user_file(given), ignored)) return;
@@ -59,7 +60,8 @@ void require_file(const fs::path& given, const char* option, const char* example
                                  .expected = std::string("a file, such as ") + example});
 }
 
-// Returns the file named on the command line, else the cell's own file (named by KEY), else the shipped file `without`.
+// Returns the file `given` on the command line, else the file `cells_own` that the cell names under `key`, else the
+// shipped file `without`.
 fs::path chosen(const fs::path& given, const description::Cell& cell, const char* key, const std::string& cells_own,
                 const char* without) {
   if (!given.empty()) return user_file(given);
@@ -69,7 +71,8 @@ fs::path chosen(const fs::path& given, const description::Cell& cell, const char
   return file;
 }
 
-// Mean age of a sample (s): the converter holds it for half a period, and the filter adds its time constant.
+// Returns the mean age of a sample in s. The converter holds a sample for half the sampling period on average, and the
+// filter adds its time constant.
 double sensor_delay_s(const description::SensorPlacement& sensor) {
   double delay_s = sensor.delay_s;
   if (sensor.sample_rate_Hz > 0.0) delay_s += 0.5 / sensor.sample_rate_Hz;
@@ -77,13 +80,14 @@ double sensor_delay_s(const description::SensorPlacement& sensor) {
   return delay_s;
 }
 
-// Delay of ElasticSetpoint's critically damped filter, 2/ω (s).
+// Returns the delay of ElasticSetpoint's critically damped filter, 2/ω, in s.
 double setpoint_filter_delay_s(const description::Cell& cell) {
   return cell.limits.setpoint_bandwidth_Hz > 0.0 ? 2.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz) : 0.0;
 }
 
-// Returns how many equal readings in a row are allowed. A real sensor never repeats itself, a simulated one without
-// noise does. A sensor slower than the cycle is read several times per sample. 0: repetitions aren't counted.
+// Returns how many equal readings in a row are allowed; 0: equal readings aren't counted. A real sensor's samples
+// always differ; those of a simulated sensor without noise may be equal. A sensor slower than the cycle is read several
+// times per sample.
 std::uint32_t repeats_allowed(const description::SensorPlacement& sensor, bool real, std::uint32_t samples,
                               double period_s) {
   if (!real && !(sensor.noise_N > 0.0)) return 0;
@@ -91,7 +95,8 @@ std::uint32_t repeats_allowed(const description::SensorPlacement& sensor, bool r
   return samples * static_cast<std::uint32_t>(std::ceil(std::clamp(reads, 1.0, 1000.0)));
 }
 
-// A sensor that sends less often than the cycle runs counts as missed only after several of its own periods.
+// Returns how many cycles in a row may pass without a sample. If a sensor sends less often than once a cycle, `samples`
+// counts the sensor's periods instead of cycles.
 std::uint32_t missed_samples_allowed(const description::SensorDescription& sensor, std::uint32_t samples,
                                      double period_s) {
   if (!sensor.described || !sensor.described->streams()) return samples;
@@ -99,12 +104,12 @@ std::uint32_t missed_samples_allowed(const description::SensorDescription& senso
   return samples * static_cast<std::uint32_t>(std::ceil(std::clamp(cycles, 1.0, 1000.0)));
 }
 
-// Mean delay of a streaming sensor (s), which isn't synchronous with the cycle.
+// Returns the mean delay, in s, that a streaming sensor adds because it isn't synchronous with the cycle.
 double stream_delay_s(const description::SensorDescription& sensor) {
   return sensor.described && sensor.described->streams() ? 0.5 / sensor.described->rate_Hz : 0.0;
 }
 
-// Below, no computer keeps the cycle; above, a contact no longer feels like touch.
+// With a shorter period no computer keeps the cycle; with a longer one a contact no longer feels like touch.
 constexpr double shortest_period_s = 50e-6, longest_period_s = 0.1;
 
 void require_period(const PreparedSession& session, const RunOptions& options) {
@@ -126,7 +131,7 @@ void require_period(const PreparedSession& session, const RunOptions& options) {
   }
 }
 
-// Sets T and all settings that are counted in cycles of T.
+// Sets T and all settings that are counted in cycles.
 void set_timestep(PreparedSession& session, const RunOptions& options, double period_s) {
   controller::SessionSettings& settings = session.settings;
   settings.period_s = session.loop.period_s = period_s;
@@ -136,15 +141,16 @@ void set_timestep(PreparedSession& session, const RunOptions& options, double pe
   require_period(session, options);
 }
 
-// A setpoint is reached one period after it is latched, in addition to the period of any sampled loop. A torque is held
-// for a period, which delays it by half a period.
+// Returns the loop's delay beyond the one period that every sampled loop has. A position setpoint is reached one period
+// after it is latched. A torque is held for a period, which delays it by half a period on average.
 double loop_delay_s(const PreparedSession& session) {
   if (session.impedance()) return 0.5 * session.settings.period_s;
   return session.settings.period_s + sensor_delay_s(session.cell.sensor) + stream_delay_s(session.sensor) +
          setpoint_filter_delay_s(session.cell);
 }
 
-// The impedance type renders at the point with the device's own mass, so options of a proxy are refused.
+// Sets the scheme. The impedance type has no proxy with a mass of its own, so for it the options of a proxy are
+// refused.
 void choose_scheme(PreparedSession& session, const RunOptions& options) {
   using controller::Scheme;
   controller::SessionSettings& settings = session.settings;
@@ -176,7 +182,8 @@ void choose_scheme(PreparedSession& session, const RunOptions& options) {
   settings.mass_kg = 0.0;
 }
 
-// Held means J → ∞, so inertia, damping and spring of turning have no meaning.
+// Sets the orientation's mode. A held orientation means J → ∞, so the options for inertia, turning damping and turning
+// spring are refused with it.
 void choose_orientation(PreparedSession& session, const RunOptions& options) {
   using controller::OrientationMode;
   controller::SessionSettings& settings = session.settings;
@@ -190,7 +197,7 @@ void choose_orientation(PreparedSession& session, const RunOptions& options) {
         {.key = turns, .found = "--orientation held", .expected = "--orientation free, or none of the two"});
   }
   settings.rotational_inertia_kg_m2 = options.inertia_kg_m2.value_or(settings.rotational_inertia_kg_m2);
-  // A requested inertia is felt without the default damping, as a requested mass is.
+  // With a requested inertia there is no default damping, as with a requested mass.
   if (options.inertia_kg_m2) settings.rotational_damping_Nms_per_rad = 0.0;
   settings.rotational_damping_Nms_per_rad =
       options.turning_damping_Nms_per_rad.value_or(settings.rotational_damping_Nms_per_rad);
@@ -198,7 +205,7 @@ void choose_orientation(PreparedSession& session, const RunOptions& options) {
       options.turning_spring_Nm_per_rad.value_or(settings.rotational_spring_Nm_per_rad);
 }
 
-// Takes the tool named on the command line, else the scene's, else the cell's.
+// Sets the tool to the one named on the command line, else to the scene's, else to the cell's.
 void choose_tool(PreparedSession& session, const RunOptions& options) {
   const std::string& of_cell = session.cell.tool.shape;
   if (options.tool == "point") {
@@ -229,7 +236,8 @@ void require_renderable_tool(PreparedSession& session) {
   session.rigid = scenes::compile_rigid(session.scene, session.scene.tool->shape);
 }
 
-// A wall's K and B must be stable on the device without a hand, in its lightest and in its heaviest direction.
+// Throws SetupError unless the virtual coupling's K and B at a wall are stable without a hand, in the device's lightest
+// and heaviest direction.
 void require_stable_coupling(const PreparedSession& session) {
   const controller::SessionSettings& settings = session.settings;
   const models::Arm arm(session.cell);
@@ -270,7 +278,8 @@ void choose_passivity(PreparedSession& session, const RunOptions& options) {
                               : cells == "auto"    ? Passivity::automatic
                               : cells == "observe" ? Passivity::observe
                                                    : Passivity::off;
-  // The impedance type has nothing to observe, so for it only `on` is a contradiction.
+  // In the impedance type there is no energy to observe: `automatic` and `observe` in the cell become `off`, and `on`
+  // is refused.
   const bool nothing_to_see = session.impedance() && otherwise != Passivity::on;
   session.settings.passivity = options.passivity.value_or(nothing_to_see ? Passivity::off : otherwise);
   if (!session.impedance() || session.settings.passivity == Passivity::off) return;
@@ -286,7 +295,8 @@ void choose_passivity(PreparedSession& session, const RunOptions& options) {
                                  .expected = "off: its tool isn't sent anywhere, and follows the hand without delay"});
 }
 
-// The loader has checked that the cell fulfils its profile. An option must not undo that.
+// Throws SetupError if an option removes what the cell's profile requires. The loader has already checked the cell
+// itself.
 void require_profile(const PreparedSession& session) {
   if (session.cell.profile != description::Profile::hand_guiding) return;
   if (!session.settings.without_enabling_input) return;
@@ -305,7 +315,7 @@ std::shared_ptr<const std::vector<controller::ElasticArm>> arms_at(const Prepare
   return arms;
 }
 
-// For example "20 kN/m": scenes have round numbers.
+// Returns the stiffness as text, for example "20 kN/m". Three digits are enough, because scenes have round numbers.
 std::string stiffness_text(double N_per_m) {
   std::array<char, 40> text{};
   const bool kilo = N_per_m >= 1000.0;
@@ -313,7 +323,7 @@ std::string stiffness_text(double N_per_m) {
   return text.data();
 }
 
-// For example "layer 'foam' of 20 kN/m and layer 'mat' of 4 kN/m at once".
+// Returns the layers as text, for example "layer 'foam' of 20 kN/m and layer 'mat' of 4 kN/m at once".
 std::string words_of(const scenes::LayersTogether& layers) {
   std::string words;
   for (const scenes::PressedLayer& layer : layers) {
@@ -323,7 +333,8 @@ std::string words_of(const scenes::LayersTogether& layers) {
   return words + (layers.size() > 1 ? " at once" : "");
 }
 
-// The hand slides on each combination of layers; on a single layer with friction it may also stick.
+// Returns the ways in which the tool may touch the scene's layers: it slides on each combination of layers, and on a
+// single layer with friction it may also stick. Returns null if the scene has no layers.
 std::shared_ptr<const std::vector<controller::LayerTouch>> layers_of(const scenes::Scene& scene) {
   auto all = std::make_shared<std::vector<controller::LayerTouch>>();
   for (const scenes::LayersTogether& layers : scenes::layer_touches(scene)) {
@@ -353,10 +364,11 @@ double felt_inertia_kg_m2(const PreparedSession& session) {
 controller::LoopModel turning_loop(const PreparedSession& session) {
   const models::Arm arm(session.cell);
   controller::LoopModel loop = session.loop;
-  loop.horizon_s = 0.0;  // only the translation is predicted
+  loop.horizon_s = 0.0;  // the lookahead predicts the translation only
   loop.order = 1;
-  loop.layers = nullptr;  // the tool's place is held
-  // With the place held, feed-forward would seem to need a quarter more inertia than it does; PoseLoop judges it.
+  loop.layers = nullptr;  // with a held place, layers have no effect
+  // This loop holds the tool's place. With feed-forward in it, the inertia needed would come out a quarter too large;
+  // PoseLoop judges the feed-forward.
   loop.either_drive = false;
   loop.handle_mass_kg = models::tool_inertia(session.cell.tool).largest_kg_m2;
   loop.damping_Ns_per_m = session.settings.rotational_damping_Nms_per_rad;
@@ -367,15 +379,15 @@ controller::LoopModel turning_loop(const PreparedSession& session) {
 }
 
 namespace {
-// Whether the hand turns the tool. If the hand doesn't twist the handle there is no loop, and the proxy's own pole at 1
-// would count as unstable.
+// Returns whether the hand turns the tool. If the hand doesn't twist the handle, rotation has no loop with the hand,
+// and the proxy's pole at 1 would count as unstable.
 bool is_turned(const PreparedSession& session) {
   return !session.impedance() && session.settings.orientation != controller::OrientationMode::held &&
          session.cell.drives.size() >= 6 && session.hand.twists();
 }
 
-// The points at which contact is assumed. A tool with a shape touches with its extreme points in the directions of a
-// cube's faces and corners; a point tool touches at T.
+// Returns the points at which contact is assumed. For a tool with a shape these are the extreme points in the
+// directions of a cube's faces and corners. A point tool touches at T's origin.
 std::vector<controller::TouchedPlace> touched_places_T(const PreparedSession& session) {
   std::vector<controller::TouchedPlace> places;
   const bool is_point = !session.scene.tool;
@@ -383,7 +395,7 @@ std::vector<controller::TouchedPlace> touched_places_T(const PreparedSession& se
     const int x = i % 3 - 1, y = i / 3 % 3 - 1, z = i / 9 - 1;
     const models::Vec3 way(x, y, z);
     if (way.squaredNorm() != 1.0 && way.squaredNorm() != 3.0) continue;
-    if (is_point && i > 13) continue;  // the opposite directions give the same constraint
+    if (is_point && i > 13) continue;  // the opposite direction gives the same constraint
     const models::Vec3 n_T = way.normalized();
     const models::Vec3 r_T = is_point ? models::Vec3::Zero() : models::furthest_of(session.scene.tool->shape, n_T);
     places.push_back({r_T, n_T});
@@ -426,10 +438,11 @@ description::SetupProblem timestep_problem(const description::Cell& cell, const 
           .key = "default_period_s"};
 }
 
-// The loosest grip that is judged. A hand without stiffness, such as one that plays a recorded force, lets the tool
-// drift: an eigenvalue of exactly 1 at any mass, which isn't an instability. With this grip the drift decays. A
-// kilogram then has a period of six seconds, far slower than any oscillation of interest, and D > K L for any delay L
-// below a second.
+// The loosest grip that is judged; it replaces looser ones. A hand without stiffness, such as one that plays a recorded
+// force, lets the tool drift: the loop has an eigenvalue of exactly 1 at any mass, which isn't an instability. With the
+// loosest grip the drift decays. A kilogram on this grip swings with a period of six seconds, far slower than any
+// oscillation of interest. With this grip D > K L for any loop delay L below a second; with D < K L no mass would be
+// stable.
 constexpr double loosest_N_per_m = 1.0, loosest_Ns_per_m = 1.0;
 
 namespace {
@@ -438,8 +451,8 @@ controller::HandModel held_with(const description::Grip& grip, double mass_kg) {
   return {loosest_N_per_m, std::max(grip.damping_Ns_per_m, loosest_Ns_per_m), mass_kg};
 }
 
-// Returns each other grip once, at its largest stiffness. A grip without stiffness and damping has let go and is left
-// out.
+// Returns each of the hand's grips other than the tightest one, at its largest stiffness and damping, without
+// duplicates. A grip with hardly any stiffness and damping is left out, because the hand has let go.
 std::vector<description::Grip> other_grips(const description::HandDescription& hand,
                                            const description::Grip& tightest) {
   std::vector<description::Grip> all{{0.0, hand.stiffness_N_per_m, hand.damping_Ns_per_m}}, others;
@@ -457,7 +470,8 @@ std::vector<description::Grip> other_grips(const description::HandDescription& h
 }
 }  // namespace
 
-// The smallest stable mass is computed for a grip only if the smallest mass found so far is unstable with it.
+// To save time, a grip's smallest stable mass is computed only if the largest of the earlier grips' smallest stable
+// masses is unstable with this grip.
 controller::HandModel hand_model(const PreparedSession& session, controller::LoopModel loop) {
   const description::Grip tightest = description::tightest_grip(session.hand);
   controller::HandModel worst = held_with(tightest, session.hand.mass_kg);
@@ -483,7 +497,7 @@ std::vector<models::JointVector> led_poses(const PreparedSession& session) {
     leads.push_back({.offset_m = models::Vec3(waypoint.offset_m.data())});
     if (is_turned(session)) leads.back().turn_rad = models::Vec3(waypoint.turn_rad.data());
   }
-  // Poses at both ends of each sine, and at both ends of the sum of all sines.
+  // Adds the poses at both ends of each sine, and at both ends of the sum of all sines.
   controller::Lead all;
   const auto add_both = [&](const controller::Lead& lead) {
     leads.push_back(lead);
@@ -497,7 +511,7 @@ std::vector<models::JointVector> led_poses(const PreparedSession& session) {
     add_both(end);
   }
   if (session.hand.multisine.size() > 1) add_both(all);
-  // Takes about 48 rows of a trajectory, to save time.
+  // Adds the poses at about 48 rows of a trajectory; more would take too much time.
   constexpr std::size_t places = 48;
   const std::vector<description::TimedVector>& trajectory = session.hand.trajectory;
   const std::size_t step = std::max<std::size_t>(1, trajectory.size() / places);
@@ -521,7 +535,7 @@ double longest_horizon_s(const PreparedSession& session) {
 }
 
 namespace {
-// Chosen in the start pose, as the gears are the same in every pose.
+// Chooses the damping of the gears. The start pose is enough, as the gears are the same in every pose.
 void choose_gear_damping(PreparedSession& session) {
   controller::GearDampingChoice& chosen = session.loop.gear_damping;
   chosen = {};
@@ -638,7 +652,7 @@ PreparedSession with_tool(PreparedSession session, double mass_kg, const std::ar
 }
 
 namespace {
-// The largest mass for a hand to move. Stability isn't computed beyond it, because numbers would overflow.
+// The largest mass that a session may have. For larger masses stability isn't computed, because numbers would overflow.
 constexpr double heaviest_kg = 10'000.0;
 
 void require_mass_in_range(const PreparedSession& session, const RunOptions& options) {
@@ -650,7 +664,7 @@ void require_mass_in_range(const PreparedSession& session, const RunOptions& opt
                                  .expected = "at most " + description::number_text(heaviest_kg) + " kg"});
 }
 
-// A requested horizon may be at most the one that `auto` would choose.
+// Throws SetupError if the requested horizon is longer than the one that `auto` would choose.
 void require_stable_horizon(const PreparedSession& session) {
   if (session.lookahead.kind != LookaheadChoice::Kind::fixed) return;
   const double longest_s = longest_horizon_s(session);
@@ -695,7 +709,7 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
                                    .expected = "--bus sim: an unstable mass is for simulation only"});
   }
   try {
-    // First without lookahead, so that lookahead never makes an otherwise unstable mass pass.
+    // The mass is judged without lookahead, so that lookahead never makes a mass pass that is unstable without it.
     controller::LoopModel loop = session.loop;
     loop.horizon_s = 0.0;
     controller::require_stable_mass(session.settings.mass_kg, hand_model(session), loop, options.force_unstable);
@@ -719,7 +733,8 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
   if (is_stable && both->stable(mass_kg, inertia_kg_m2)) return;
   const std::optional<double> least_alone = controller::smallest_stable_mass(hand, alone);
   if (!least_alone)
-    controller::require_stable_inertia(inertia_kg_m2, hand, alone, false);  // throws: no inertia is stable
+    // Throws, because no inertia is stable.
+    controller::require_stable_inertia(inertia_kg_m2, hand, alone, false);
   std::optional<double> smallest = both->smallest_inertia(mass_kg);
   if (smallest) smallest = std::max(*smallest, *least_alone + alone.handle_mass_kg);
   controller::refuse_unstable_pose(mass_kg, inertia_kg_m2, smallest);

@@ -105,7 +105,7 @@ std::optional<ProofFile> kept_proof(const fs::path& file, const std::string& cel
     const ProofFile proof = read_proof(file);
     if (proof.cell_sha256 == cell_sha256 && proof.real_arm == real_arm) return proof;
   } catch (const description::SetupError&) {
-    return std::nullopt;  // the new proof replaces an unreadable file
+    return std::nullopt;  // the new proof will replace an unreadable file
   }
   return std::nullopt;
 }

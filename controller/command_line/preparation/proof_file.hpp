@@ -1,4 +1,5 @@
-// Reads and writes the proof of a cell, the file CELL.proof beside it: which cell was proven, on which arm, and when.
+// Reads and writes the proof of a cell, which is the file CELL.proof beside the cell. It says which cell was proven, on
+// which arm, and when.
 #pragma once
 
 #include <filesystem>
@@ -10,29 +11,29 @@
 
 namespace proxarm::command_line {
 
-// How a drive stopped after the controller was silenced on purpose.
+// How a drive stopped by itself after the controller was silenced on purpose.
 struct ProvenStop {
   std::string joint;
-  double after_ms = 0.0;  // since the controller's last frame
+  double after_ms = 0.0;  // time from the controller's last frame to the stop
   std::string signs;      // what the drive reported, as text for people
 };
 
 struct ProofFile {
-  std::string cell_sha256;  // of the cell's file, its URDF and its sensor's file, one after the other
+  std::string cell_sha256;  // hash of the cell's file, its URDF and its sensor's file, one after the other
   bool real_arm = false;    // false: a simulated arm
   std::string date;         // UTC
-  std::string verdict;      // for people
-  bool whole = true;        // signs, ratios, sensor and brakes are proven; false: only the bus loss
+  std::string verdict;      // what was proven, as text for people
+  bool whole = true;        // true: signs, ratios, sensor and brakes are proven; false: only the bus loss is
   std::vector<ProvenStop> bus_loss;
 };
 
-// Throws SetupError if one of the files can't be read.
+// Returns ProofFile::cell_sha256 for the session's cell. Throws SetupError if one of the files can't be read.
 std::string cell_sha256(const PreparedSession& session);
-// The present date and time in UTC.
+// Returns the present date and time in UTC.
 std::string today();
 std::filesystem::path proof_path(const description::Cell& cell);
 
-// Returns the existing proof of this cell on this kind of arm; nullopt if there is none.
+// Returns the proof in the file if it is of this cell and on this kind of arm, real or simulated; otherwise nullopt.
 std::optional<ProofFile> kept_proof(const std::filesystem::path& file, const std::string& cell_sha256, bool real_arm);
 
 // Throws SetupError if the file can't be written.

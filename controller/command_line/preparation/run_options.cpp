@@ -25,7 +25,7 @@ std::string join(const std::vector<std::string>& names) {
 LookaheadChoice LookaheadChoice::parse(std::string_view text, std::string_view option) {
   if (text == "off") return {};
   if (text == "auto") return {Kind::automatic, 0.0};
-  // With a longer horizon, a hand would feel the response to its push before it can react.
+  // With a longer horizon, the hand would feel the arm's response to a push before the hand can react.
   constexpr double longest_s = 0.1;
   const auto refuse = [&] {
     throw description::SetupError({.key = std::string(option),

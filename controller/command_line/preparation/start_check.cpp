@@ -29,12 +29,13 @@ namespace {
 using description::SetupError;
 using models::Vec3;
 
-// A start on a surface is allowed. start_rad has four decimals in most files. Half of the last one is 0.07 mm on an arm
-// of 1.4 m, and the proxy's first step corrects that.
+// How deep inside an object a start counts as on the object's surface, which is allowed. start_rad has four decimals in
+// most files. Half a unit of the fourth decimal is 0.07 mm on an arm of 1.4 m, and the proxy's first step corrects such
+// a depth.
 constexpr double start_tolerance_m = 1e-4;
 
-// The share of a drive's torque that the arm's weight may take. The rest is for accelerating and braking, friction (3 %
-// in the default cell), the hand's pull (200 N at 1.5 m: 12 %), and the gears' overshoot.
+// The largest share of a drive's torque that the arm's weight may take without a warning. The rest is for accelerating
+// and braking, friction (3 % in the default cell), the hand's pull (200 N at 1.5 m: 12 %), and the gears' overshoot.
 constexpr double heavy_share = 0.4;
 
 std::string point_text(const Vec3& point_W) {
@@ -43,8 +44,8 @@ std::string point_text(const Vec3& point_W) {
   return text;
 }
 
-// Smallest singular value of the tool's Jacobian at the start, m/rad. The impedance type renders forces at the point
-// alone, so on six or more axes it counts translation only.
+// Returns the smallest singular value of the tool's Jacobian in the start pose, in m/rad. The impedance type renders
+// only forces at the tool's point, so with six or more axes only the Jacobian's rows of translation count for it.
 double smallest_singular_value(const PreparedSession& session, const models::Arm& arm) {
   if (session.impedance() && arm.axes() >= 6) {
     models::ToolKinematics tool;
@@ -75,14 +76,15 @@ void require_regular(const PreparedSession& session, const models::Arm& arm) {
 
 std::string vector_text(const Vec3& v) {
   char text[80];
-  const auto rounded = [](double value) { return std::round(1e6 * value) / 1e6 + 0.0; };  // no -0
+  const auto rounded = [](double value) { return std::round(1e6 * value) / 1e6 + 0.0; };  // + 0.0 turns -0 into 0
   std::snprintf(text, sizeof text, "[%.6g, %.6g, %.6g]", rounded(v.x()), rounded(v.y()), rounded(v.z()));
   return text;
 }
 
-// The scene's space must lie within the space in which the tool can move.
+// Throws SetupError if the scene's space has directions in which the tool can't move.
 void require_reachable_space(const PreparedSession& session, const models::Arm& arm, const Vec3& start_W) {
-  constexpr double leaves = 2e-3;  // tool_space() tolerates 1e-3 for rounded numbers; as much again for the scene's
+  // tool_space() tolerates 1e-3 for the cell's rounded numbers; the scene's rounded numbers may add as much again.
+  constexpr double leaves = 2e-3;
   const models::ToolSpace reach = models::tool_space(arm);
   const scenes::Space& space = session.scene.space;
   const models::Mat3 off = models::Mat3::Identity() - reach.projection();
@@ -101,7 +103,8 @@ void require_reachable_space(const PreparedSession& session, const models::Arm& 
                               vector_text(start_W) + ", axes: [" + axes + "]}` into the scene"});
 }
 
-// Free orientation needs all three rotations of the tool.
+// Throws SetupError if the orientation is free and the arm has fewer than six axes, which can't turn the tool about all
+// three axes.
 void require_turning(const PreparedSession& session, const models::Arm& arm) {
   if (session.settings.orientation == controller::OrientationMode::held || arm.axes() >= 6) return;
   throw SetupError({.key = "--orientation",
@@ -109,7 +112,7 @@ void require_turning(const PreparedSession& session, const models::Arm& arm) {
                     .expected = "held: fewer than six axes can't turn the tool as a hand likes"});
 }
 
-// Returns the object that contains the point most deeply; each object is judged alone.
+// Returns the object in which the point lies deepest. Each object is judged without the others.
 const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
   const scenes::Object* found = nullptr;
   double least_m = std::numeric_limits<double>::infinity();
@@ -138,8 +141,8 @@ void require_outside(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move or turn the object, or change start_rad in the cell file"});
 }
 
-// A rigid tool must start outside all objects, because 𝒢 can't lead out of a solid. Contact is allowed, within the
-// accuracy of start_rad.
+// Throws SetupError if a rigid tool starts inside an object, because 𝒢 can't lead a tool out of a solid. A tool may
+// start in contact.
 void require_room(const PreparedSession& session, const models::Pose& start) {
   const double clearance_m = session.rigid->clearance_m(models::tool_pose(start));
   if (clearance_m >= 0.0) return;
@@ -161,7 +164,8 @@ double first_step_m(const scenes::CompiledScene& world, const Vec3& start_W) {
   return (world.algorithm<N>()(1.0, start, start) - start).norm();
 }
 
-// If the tool isn't on the guide, the guide would pull the proxy onto it in one step.
+// Throws SetupError if the tool doesn't start on the scene's guide. The guide would pull the proxy from there onto
+// itself in one step.
 void require_on_guide(const PreparedSession& session, const Vec3& start_W) {
   if (!session.scene.guide) return;
   const scenes::CompiledScene world = scenes::compile(session.scene);
@@ -177,8 +181,9 @@ void require_on_guide(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move the guide, or change start_rad in the cell file"});
 }
 
-// In a space of fewer dimensions the proxy stays beside the tool by the distance at which the tool starts from the
-// space. Objects would then be felt at a place other than the file's.
+// Throws SetupError if the tool doesn't start in the scene's space of one or two dimensions. The tool would keep its
+// first distance from the space and thus from the proxy, so objects would be felt beside the place that the file gives
+// them.
 void require_in_space(const PreparedSession& session, const Vec3& start_W) {
   const scenes::Space& space = session.scene.space;
   const auto axes = space.axes.leftCols(space.dimensions);
@@ -194,11 +199,12 @@ void require_in_space(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move space.origin_m, or change start_rad in the cell file"});
 }
 
-// The start must be inside the workspace and outside all keep-out boxes, at least the tool's stopping setback from
-// their borders.
+// Throws SetupError unless the tool starts inside the workspace and outside all keep-out boxes, at a distance of at
+// least longest_setback_m from the boxes' borders.
 void require_allowed(const PreparedSession& session, const models::Vec3& start_W) {
   const description::CellLimits& limits = session.cell.limits;
-  // less_m(thickness): how much smaller the box is on each side.
+  // Returns whether the start is inside the box, made smaller on each side by less_m(the box's thickness along that
+  // axis).
   const auto inside = [&](const std::array<double, 3>& min_m, const std::array<double, 3>& max_m, auto less_m) {
     const models::Vec3 min(min_m.data()), max(max_m.data());
     const models::Vec3 less = (max - min).unaryExpr(less_m);
@@ -222,7 +228,7 @@ void require_allowed(const PreparedSession& session, const models::Vec3& start_W
   }
 }
 
-// For example "148 of the 132 Nm": the weight's torque and a share of the drive's.
+// Returns the weight's torque and a share of the drive's torque as text, for example "148 of the 132 Nm".
 std::string weight_text(const models::Arm& arm, const controller::HeldWeight& held, double share) {
   char text[64];
   std::snprintf(text, sizeof text, "%.3g of the %.3g %s", held.weight_Nm, share * held.rated_Nm,
@@ -234,7 +240,7 @@ const std::string& joint_of(const PreparedSession& session, const controller::He
   return session.cell.drives[static_cast<std::size_t>(held.axis)].joint;
 }
 
-// If a drive can't hold the arm's weight, it can't hold the start pose.
+// Throws SetupError if a drive can't hold the arm's weight in the start pose.
 void require_weight_held(const PreparedSession& session, const models::Arm& arm) {
   const controller::HeldWeight held = controller::held_weight(arm, session.cell, arm.start_rad());
   if (held.share() < 1.0) return;
@@ -248,7 +254,7 @@ void require_weight_held(const PreparedSession& session, const models::Arm& arm)
 
 // Warns if the weight leaves a drive too little torque to accelerate and brake.
 std::vector<std::string> weight_surprises(const PreparedSession& session, const models::Arm& arm) {
-  if (session.impedance()) return {};  // its torques are rendered on top of the weight's
+  if (session.impedance()) return {};  // its drives get torques, the weight's included, and no positions
   const controller::HeldWeight most = controller::heaviest_weight(arm, session.cell);
   if (most.share() < heavy_share) return {};
   return {session.cell.file.string() + ": " + joint_of(session, most) + ": at the worst the arm's weight takes " +
@@ -257,8 +263,8 @@ std::vector<std::string> weight_surprises(const PreparedSession& session, const 
                               : "such poses the drive can't hold it")};
 }
 
-// Warns of a simulated hand that pulls at the start: the sensor's tare would take that force for its zero, or raise
-// Fault::force_at_start.
+// Warns of a simulated hand that pulls at the start: the tare would take the hand's force for the sensor's zero, or
+// raise Fault::force_at_start.
 std::vector<std::string> hand_surprises(const PreparedSession& session) {
   const description::HandDescription& hand = session.hand;
   std::array<double, 3> at_m{};
@@ -310,7 +316,7 @@ void require_runnable(const PreparedSession& session, const RunOptions& options)
 
 std::vector<std::string> surprises(const PreparedSession& session) {
   const models::Arm arm(session.cell);
-  // The arm's reach: no joint's axis is further from the tool.
+  // The arm's reach: the largest distance of a joint's axis from the tool in any pose.
   const double reach_m = std::max(arm.path_curvature().maxCoeff(), 0.1);
   std::vector<std::string> lines = controller::cell_doubts(session.cell, arm);
   const auto add = [&](const std::vector<std::string>& more) { lines.insert(lines.end(), more.begin(), more.end()); };

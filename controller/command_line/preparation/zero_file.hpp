@@ -1,5 +1,6 @@
-// Reads and writes the zero of a cell's force sensor, the file CELL.zero beside the cell. It holds what the sensor
-// reads beyond the tool's weight with nobody at the handle, with date and pose. A session's tare is compared with it.
+// Reads and writes the zero of a cell's force sensor, which is the file CELL.zero beside the cell. The zero is the
+// sensor's reading minus the tool's weight with nobody at the handle; the file also has the date and the pose. A
+// session compares its tare with the zero.
 #pragma once
 
 #include <array>
@@ -17,8 +18,9 @@ struct ZeroFile {
   bool real_arm = false;    // false: a simulated arm
   std::string date;         // UTC
   std::array<double, 3> force_S_N{}, torque_S_Nm{};
-  double noise_N = 0.0, spread_N = 0.0;  // noise of one sample; largest distance of a sample from the mean
-  std::vector<double> motor_rad;         // the pose
+  // Noise of one sample, and largest difference of a sample from the mean.
+  double noise_N = 0.0, spread_N = 0.0;
+  std::vector<double> motor_rad;  // angles of the motors during the tare
 };
 
 std::filesystem::path zero_path(const description::Cell& cell);
@@ -26,7 +28,7 @@ std::filesystem::path zero_path(const description::Cell& cell);
 // Throws SetupError if the file can't be written.
 void write_zero(const std::filesystem::path& file, const ZeroFile& zero);
 
-// Returns the zero of this cell on this kind of arm; nullopt if there is none or it belongs to another cell. Throws
+// Returns the kept zero if it is of this cell and of this kind of arm, real or simulated; otherwise nullopt. Throws
 // SetupError if the file isn't a zero file.
 std::optional<ZeroFile> kept_zero(const PreparedSession& session, bool real_arm);
 

@@ -41,11 +41,11 @@ std::optional<Alternative::Kind> kind_of(YamlFact::Kind kind) {
     case YamlFact::Kind::choice:
       return Alternative::Kind::choice;
     default:
-      return std::nullopt;  // places tell maps apart; other facts don't tell the kind
+      return std::nullopt;  // maps are known from the places, and the other facts don't tell the kind
   }
 }
 
-// All facts of one place apply.
+// Narrows `a` by a further fact from the same place, because all facts of one place apply.
 void narrow(Alternative& a, const YamlFact& fact) {
   if (fact.range.min > a.range.min || (fact.range.min == a.range.min && fact.range.above_min)) {
     a.range.min = fact.range.min;
@@ -65,7 +65,7 @@ void leave_out(std::vector<Alternative>& all, Alternative::Kind kind) {
   std::erase_if(all, [&](const Alternative& a) { return a.kind == kind; });
 }
 
-// The kinds of value that the reader takes for a key in one place.
+// Returns the kinds of value, other than maps, that the reader takes for a key in one place.
 std::vector<Alternative> scalars_of(const KeyFacts& facts) {
   using Kind = Alternative::Kind;
   std::vector<Alternative> all;
@@ -76,7 +76,7 @@ std::vector<Alternative> scalars_of(const KeyFacts& facts) {
     if (same == all.end()) same = all.insert(all.end(), Alternative{.kind = *kind, .outer = fact.range});
     narrow(*same, fact);
   }
-  // Paths and choices are also read as texts, lists of numbers also as lists.
+  // The reader reads paths and choices also as texts, and lists of numbers also as lists, so these kinds are left out.
   if (has(all, Kind::path) || has(all, Kind::choice)) leave_out(all, Kind::text);
   if (has(all, Kind::numbers)) leave_out(all, Kind::list);
   for (const YamlFact& fact : facts.facts) {
@@ -89,8 +89,8 @@ std::vector<Alternative> scalars_of(const KeyFacts& facts) {
   return all;
 }
 
-// Merges what several places accept. Bounds that differ depend on other keys' values. Returns whether something
-// differs.
+// Widens `a` to all values that `a` and `b`, from different places, accept. Bounds that differ depend on other keys'
+// values. Returns whether `a` and `b` differ.
 bool widen(Alternative& a, const Alternative& b) {
   bool differs = false;
   if (a.outer.min != b.outer.min) a.outer.min = lowest;
@@ -134,7 +134,8 @@ class Builder {
     for (const Place* root : specimens.roots()) note_paths(*root);
   }
 
-  // Adds the number of unexplained contradictions to `contradictions`.
+  // Builds the model of a map from all places with the map's path. Adds the number of unexplained contradictions to
+  // `contradictions`.
   MapModel build(const Places& places, int& contradictions) const {
     MapModel model{.path = places.front()->path};
     model.exactly_one = places.front()->exactly_one;
@@ -158,7 +159,8 @@ class Builder {
     return keys;
   }
 
-  // Builds a map of names: all names have the same facts.
+  // Builds the model of a map whose keys are names of the user's choice. The facts of all names are merged into one
+  // key.
   MapModel build_names(const Places& places, MapModel model, int& contradictions) const {
     std::vector<std::unique_ptr<Place>> made;
     Places views;
@@ -190,7 +192,7 @@ class Builder {
     return model;
   }
 
-  // Merges what all these places say of a key.
+  // Merges the facts that these places have about a key.
   Found summarise(const std::string& key, const Places& places) const {
     Found found;
     std::optional<Standing> standing;
@@ -207,7 +209,8 @@ class Builder {
       if (facts->otherwise) defaults.emplace(facts->otherwise->dump(), *facts->otherwise);
       some_without = some_without || !facts->otherwise;
     }
-    // If the comment states the default, that takes precedence: the default is another key's value or follows from it.
+    // A default that the comment states takes precedence, because such a default is another key's value, or follows
+    // from one.
     const bool in_words = specimens_.meaning(places.front()->path, key).find("default:") != std::string::npos;
     if (!some_without && !in_words) {
       for (const auto& [text, value] : defaults) found.as.otherwise.push_back(value);
@@ -248,7 +251,8 @@ class Builder {
     return all;
   }
 
-  // The kinds of value that the reader takes for a key here; empty if it only asked whether the key is there.
+  // Returns the kinds of value that the reader takes for a key in this place, as letters; empty if the reader only
+  // asked whether the key is there.
   static std::string kinds_of(const Place& place, const KeyFacts& facts) {
     std::string kinds;
     for (const Alternative& a : scalars_of(facts)) kinds += static_cast<char>('a' + static_cast<int>(a.kind));
@@ -258,7 +262,8 @@ class Builder {
     return kinds;
   }
 
-  // The value by which a key decides about others, as the reader takes it; nullopt if it can't decide.
+  // Returns the key's value here, as the reader takes it, if other keys may depend on it; nullopt if no key can depend
+  // on it.
   static std::optional<std::string> decision(const Place& place, const KeyFacts& facts) {
     const auto here = place.there.find(facts.key);
     for (const YamlFact& fact : facts.facts) {
@@ -273,8 +278,8 @@ class Builder {
     return here != place.there.end() ? "+" : "-";
   }
 
-  // Of the keys that this key's comment names, returns those that all these places were asked for and that differ among
-  // them.
+  // Returns those keys named in this key's comment about which a reader asked in all of these places, and whose values
+  // differ among the places.
   std::vector<std::string> deciders(const std::string& key, const Places& places) const {
     std::vector<std::string> all;
     for (const std::string& decider : specimens_.deciders(places.front()->path, key)) {
@@ -299,12 +304,13 @@ class Builder {
     return groups;
   }
 
-  // Splits the key's facts into `cases`; returns the number of remaining contradictions.
+  // Splits the key's facts into cases without contradictions, and adds these to `cases`. Returns the number of
+  // contradictions that remain.
   int split(const std::string& key, const Places& places, const std::vector<Condition>& when,
             std::vector<KeyCase>& cases) const {
     const Found whole = summarise(key, places);
-    // The first decider that reduces contradictions; else the first one, since another may reduce them within its
-    // groups.
+    // Takes the first decider whose groups have fewer contradictions. If there is none, takes the first decider,
+    // because within its groups another decider may reduce the contradictions.
     std::string best;
     if (whole.contradictions > 0) {
       for (const std::string& decider : deciders(key, places)) {
@@ -322,7 +328,7 @@ class Builder {
       fill(key, places.front()->path, cases.back());
       return whole.contradictions;
     }
-    // Groups with the same result become one case.
+    // Groups for which the key has the same facts become one case.
     std::map<std::string, std::pair<Places, std::vector<std::string>>> same;
     for (const auto& [value, group] : grouped(places, best)) {
       auto& [together, values] = same[signature(summarise(key, group).as)];
@@ -363,7 +369,7 @@ class Builder {
     return condition;
   }
 
-  // Takes what none of these places has from other places with the same path.
+  // Fills in the kinds of value that none of the case's places has, from other places with the same path.
   void fill(const std::string& key, const std::string& path, KeyCase& as) const {
     const auto same = by_path_.find(path);
     if (as.standing == Standing::refused || same == by_path_.end()) return;

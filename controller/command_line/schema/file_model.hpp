@@ -1,8 +1,9 @@
-// Builds a model of everything that a kind of file may hold. It merges the facts from all specimens; where they differ,
-// it keeps the condition that distinguishes the cases.
+// Builds a model of everything that a kind of file may hold. The model merges the facts from all specimens. Where the
+// facts differ, the model has one case for each, with the condition that distinguishes the cases.
 //
-// A specimen's comment names the keys on which another key depends; how it depends is learnt from the reader. A
-// difference without such a key (bounds that are other keys' values) gets the range that the reader asked for first.
+// A key's comment in a specimen names the keys on which that key depends. How the key depends on them is found from the
+// reader's questions. If bounds differ and no named key explains it, because the bounds are other keys' values, the
+// model has the range that the reader asked for first.
 #pragma once
 
 #include <memory>
@@ -13,8 +14,8 @@
 
 namespace proxarm::command_line {
 
-// A condition on another key of the same map: it has one of these values (with `or_absent`: or is absent), is present,
-// or is absent.
+// A condition on another key of the same map. By `kind`, the key must have one of these values (with `or_absent`: or be
+// absent), be there, or be absent.
 struct Condition {
   enum class Kind : std::uint8_t { values, there, absent };
   Kind kind = Kind::values;
@@ -30,9 +31,10 @@ struct Alternative {
   enum class Kind : std::uint8_t { map, list, numbers, number, integer, boolean, text, path, choice };
   Kind kind = Kind::text;
   description::Range range{};
-  description::Range outer{};  // the range that the reader asked for first, which holds whatever other keys say
-  bool zero = false;           // 0 is also allowed
-  bool is_bounded = true;      // false: its bounds are other keys' values
+  // The range that the reader asked for first, which applies whatever values other keys have.
+  description::Range outer{};
+  bool zero = false;       // 0 is also allowed
+  bool is_bounded = true;  // false: the bounds are other keys' values
   std::size_t min_size = 0, max_size = static_cast<std::size_t>(-1);
   std::vector<std::string> choices{};
   std::vector<std::int64_t> values{};
@@ -42,20 +44,22 @@ struct Alternative {
 };
 
 struct KeyCase {
-  std::vector<Condition> when{};  // all must hold
+  std::vector<Condition> when{};  // conditions that must all be true
   Standing standing = Standing::optional;
-  std::vector<description::Json> otherwise{};  // the default; several if other keys choose among them
+  std::vector<description::Json> otherwise{};  // the default; several defaults if other keys choose one of them
   std::vector<Alternative> value{};
-  bool is_wide = false;  // defaults for such maps may set its keys elsewhere, so no key is required here (wide_map.hpp)
+  // The value is a map (or a list of maps) whose keys may be set elsewhere as defaults, so no key is required here
+  // (wide_map.hpp).
+  bool is_wide = false;
 };
 
 struct KeyModel {
   std::string name;
   std::string meaning{};
-  std::vector<KeyCase> cases{};  // one without a condition, or several
+  std::vector<KeyCase> cases{};  // one case without a condition, or several cases with conditions
 };
 
-// Returns the unit that a number of this key has by its name; empty if it isn't a number.
+// Returns the unit of the key's numbers, taken from the key's name; empty if the key's values aren't numbers.
 std::string unit_of(const KeyModel& key);
 
 // Returns whether the key is refused in every case.
@@ -65,13 +69,15 @@ struct MapModel {
   std::string path;
   std::vector<KeyModel> keys{};
   std::optional<std::string>
-      names{};  // pattern of keys that are names of the user's choice; `keys` then has one model for all
+      // If the map's keys are names of the user's choice: the pattern of these names. `keys` then has one model for all
+      // names.
+      names{};
   std::vector<std::string> exactly_one{};
-  std::string keys_of{};  // not empty: its keys are a subset of the keys of the maps at that path
+  std::string keys_of{};  // if not empty, this map's keys are a subset of the keys of the maps at that path
 };
 
-// Throws SetupError if the specimens are incomplete: a key in no specimen, a key without a meaning, a choice that
-// decides about other keys and that no specimen makes.
+// Builds the model of a kind of file. Throws SetupError if the specimens are incomplete: if a key is in no specimen, if
+// a key has no meaning, or if no specimen makes a choice that decides about other keys.
 MapModel model_of(const Specimens& specimens);
 
 }  // namespace proxarm::command_line

@@ -10,7 +10,7 @@ namespace {
 
 using description::Json;
 
-// Writes whole numbers as integers, up to the largest that a double holds exactly.
+// Converts a number to JSON. Whole numbers become integers, up to the largest that a double holds exactly.
 Json number_json(double value) {
   constexpr double exact = 9007199254740992.0;  // 2⁵³
   if (value >= -exact && value <= exact && value == static_cast<double>(static_cast<std::int64_t>(value))) {
@@ -47,11 +47,11 @@ Json text_schema(const Alternative& a, bool alone) {
   Json types = Json::array();
   types.push_back("string");
   if (a.pattern.empty()) {
-    // The reader takes a text that looks like a number or a truth value as a text.
+    // Where only a text is allowed, the reader also takes an unquoted number or truth value as text.
     if (alone) types.push_back("number"), types.push_back("boolean");
     return {{"type", types},
             {"minLength", 1},
-            {"maxLength", std::min<std::size_t>(a.max_size, 4096)}};  // the longest that the reader takes
+            {"maxLength", std::min<std::size_t>(a.max_size, 4096)}};  // the longest text that the reader takes
   }
   const std::regex expression(a.pattern);
   if (std::regex_match("123", expression) || std::regex_match("0x1000", expression)) types.push_back("integer");
@@ -130,7 +130,7 @@ Json described(const KeyModel& key, const std::string& unit) {
   return schema;
 }
 
-// Properties and required keys under one condition.
+// The properties and the required keys that apply under one condition.
 struct Branch {
   Json condition{}, properties = Json::object(), required = Json::array();
 };

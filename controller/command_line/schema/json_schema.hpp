@@ -1,4 +1,4 @@
-// Writes the model of a kind of file as JSON Schema, draft 2020-12, with which editors complete and check YAML.
+// Converts the model of a kind of file to a JSON Schema, draft 2020-12, with which editors complete and check YAML.
 #pragma once
 
 #include <string>

@@ -21,7 +21,7 @@ std::string joined(const std::vector<std::string>& parts, const char* between) {
   return text;
 }
 
-// As a file has it: without quotes, and without the .0 of a whole number.
+// Returns a value as a file states it: without quotes, and without the .0 of a whole number.
 std::string word(const description::Json& value) {
   const std::string text = value.dump();
   if (text.front() == '"') return text.substr(1, text.size() - 2);
@@ -135,14 +135,14 @@ std::string default_text(const KeyCase& one) {
   return joined(words, " or ");
 }
 
-// Escapes bars, which separate the table's columns.
+// Returns the text with each | escaped, because | separates the table's columns.
 std::string cell(const std::string& text) {
   std::string safe;
   for (const char c : text) safe += c == '|' ? std::string("\\|") : std::string(1, c);
   return safe;
 }
 
-// Texts with the conditions under which they apply; a text for all cases gets no condition.
+// Collects texts with the conditions under which they apply. A text that applies in all cases has no condition.
 class Cases {
  public:
   void add(const std::string& text, const std::vector<Condition>& when) {
@@ -164,7 +164,8 @@ class Cases {
   std::vector<std::pair<std::string, std::vector<std::string>>> texts_;
 };
 
-// The cases that a table shows. If a key's maps may have defaults, these are the cases without defaults.
+// Returns the cases of a key that a table shows. If the key's maps may have maps of defaults, only the cases without
+// maps of defaults are shown.
 std::vector<KeyCase> told(const KeyModel& key) {
   std::vector<KeyCase> cases = key.cases;
   if (std::erase_if(cases, [](const KeyCase& one) { return one.is_wide; }) == 0) return cases;

@@ -1,4 +1,4 @@
-// Writes the model of a kind of file as Markdown tables: each key with unit, default, range and meaning.
+// Converts the model of a kind of file to Markdown tables that give each key's unit, default, range and meaning.
 #pragma once
 
 #include <string>

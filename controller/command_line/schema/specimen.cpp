@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using description::YamlFact;
 using description::YamlNode;
 
-// drives[2].range_rad → drives[].range_rad
+// Returns the path without indices: drives[2].range_rad becomes drives[].range_rad.
 std::string without_indices(const std::string& path) {
   std::string text;
   bool inside = false;
@@ -34,11 +34,11 @@ std::string without_indices(const std::string& path) {
 
 std::string joined(const std::string& path, const std::string& key) { return path.empty() ? key : path + "." + key; }
 
-// A specimen's content, read without a journal: its maps and lists by path, and its comments.
+// A specimen's maps and lists by their paths, and its comments. It is read without a journal.
 struct Content {
   std::vector<std::string> lines{};
   std::map<std::string, Place> places{};
-  std::vector<std::pair<std::string, std::string>> meanings{};  // of keys by their paths without indices
+  std::vector<std::pair<std::string, std::string>> meanings{};  // paths of keys without indices, and the keys' comments
 
   explicit Content(const fs::path& file) {
     std::ifstream in(file);
@@ -65,7 +65,8 @@ struct Content {
     }
   }
 
-  // A line's comment belongs to the line's first key. A value may begin in a line below its key.
+  // Notes the comment of a key whose value begins in line `line`; the key may be in a line above. A line's comment
+  // belongs to the first key in that line.
   void note_meaning(const std::string& path, const std::string& key, int line) {
     static const std::regex parts(R"re(^[-\s{]*"?([^\s:"]+)"?:.*?\s#\s(.*)$)re"),
         plain(R"re(^[-\s{]*"?([^\s:"]+)"?:.*$)re");
@@ -73,7 +74,8 @@ struct Content {
       const std::string& text = lines[static_cast<std::size_t>(i - 1)];
       std::smatch found;
       if (!std::regex_match(text, found, plain) || found[1] != key) {
-        if (text.find(key + ":") != std::string::npos) return;  // in a line that begins with another key
+        // The line begins with another key, so its comment isn't this key's.
+        if (text.find(key + ":") != std::string::npos) return;
         continue;
       }
       if (std::regex_match(text, found, parts)) meanings.emplace_back(path, found[2]);
@@ -97,7 +99,7 @@ class Listener final : public description::YamlJournal {
       place.asked.push_back({.key = std::string(key)});
       facts = place.asked.end() - 1;
     }
-    // A key is required if the reader takes it without first asking whether it is there.
+    // A key is required if the reader takes its value without first asking whether the key is there.
     const bool must = fact.kind == YamlFact::Kind::required;
     if (!facts->is_told && must) facts->standing = Standing::required;
     facts->is_told = facts->is_told || must || fact.kind == YamlFact::Kind::asked;
@@ -177,7 +179,7 @@ std::string Specimens::comment(const std::string& path, const std::string& key) 
   const std::string wanted = joined(path, key);
   const auto alike = [&](const std::string& other) {
     const auto [mine, theirs] = std::mismatch(wanted.rbegin(), wanted.rend(), other.rbegin(), other.rend());
-    const std::string end(wanted.rbegin(), mine);  // backwards
+    const std::string end(wanted.rbegin(), mine);  // the names that agree, backwards
     if (mine == wanted.rend() && theirs == other.rend()) return std::size_t{1000};
     return static_cast<std::size_t>(std::count(end.begin(), end.end(), '.')) +
            (mine == wanted.rend() || theirs == other.rend() ? 1U : 0U);

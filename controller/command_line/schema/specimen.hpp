@@ -1,6 +1,6 @@
-// Reads specimens: files that together have every key of a kind of file, each with its meaning as a comment. The
-// program's own readers read them while a journal records their questions (yaml_journal.hpp). The answers are kept
-// here, place by place.
+// Reads specimens: files that together have every key of a kind of file, each key with its meaning as a comment. The
+// program's own readers read the specimens while a journal records the readers' questions (yaml_journal.hpp). A
+// Specimens object keeps what the questions tell, for each map and each list.
 #pragma once
 
 #include <filesystem>
@@ -17,11 +17,11 @@ namespace proxarm::command_line {
 
 enum class Standing : std::uint8_t { optional, required, refused };
 
-// What a reader asked about one key in one place. A list's element is a key without a name.
+// What a reader asked about one key in one place. An element of a list is a key without a name.
 struct KeyFacts {
   std::string key;
   Standing standing = Standing::optional;
-  bool is_told = false;  // whether the standing is known; the first question that tells it counts
+  bool is_told = false;  // whether a question has told the standing; the first such question counts
   std::vector<description::YamlFact> facts{};
   std::optional<description::Json> otherwise{};
 };
@@ -29,12 +29,13 @@ struct KeyFacts {
 // A map or a list of a specimen.
 struct Place {
   std::string path;  // without indices: drives[].simulation
-  std::string key;   // in the place that holds it; empty for an element of a list
+  std::string key;   // key of this place in the place that contains it; empty for an element of a list
   bool is_list = false;
-  std::vector<KeyFacts> asked{};               // in the order of the first question
-  std::map<std::string, std::string> there{};  // what the file has here; text of scalars
+  std::vector<KeyFacts> asked{};               // one for each key, in the order of the reader's first questions
+  std::map<std::string, std::string> there{};  // the file's keys here, with the text of scalars
   std::vector<const Place*> children{};
-  std::optional<std::string> names{};  // keys are names that match this pattern (empty: any)
+  // If the keys are names of the user's choice: the pattern that the names match; an empty pattern matches any name.
+  std::optional<std::string> names{};
   std::vector<std::string> exactly_one{};
 
   [[nodiscard]] const KeyFacts* find(const std::string& name) const;
@@ -42,17 +43,18 @@ struct Place {
 
 class Specimens {
  public:
-  // Reads all specimens of a kind (cell, hand, scene, sensor, drive), from the folder of that name below `folder`.
+  // Reads all specimens of a kind of file (cell, hand, scene, sensor, drive) from the folder FOLDER/KIND.
   Specimens(const std::filesystem::path& folder, const std::string& kind);
 
   [[nodiscard]] const std::vector<const Place*>& roots() const noexcept { return roots_; }
-  // Returns the comment of the key with this path, else of the first key whose path agrees in the most names, counted
-  // from its end. Empty if there is none.
+  // Returns the comment of the key with this path. If there is none, returns the comment of the key whose path agrees
+  // with this path in the most names, counted from the end; of several such keys, of the first. Returns an empty text
+  // if no key's path agrees.
   [[nodiscard]] std::string meaning(const std::string& path, const std::string& key) const;
-  // Returns the keys on which this key depends: its comment may begin with "(by KEY, KEY)".
+  // Returns the keys on which this key depends. The comment of such a key begins with "(by KEY, KEY)".
   [[nodiscard]] std::vector<std::string> deciders(const std::string& path, const std::string& key) const;
-  // Returns PATH if the key's comment begins with "(of PATH)": the key is a map of defaults for all maps there. Empty
-  // otherwise.
+  // Returns PATH if the key's comment begins with "(of PATH)", which means that the key is a map of defaults for all
+  // maps at PATH. Otherwise returns an empty text.
   [[nodiscard]] std::string shared_by(const std::string& path, const std::string& key) const;
 
  private:
@@ -61,7 +63,8 @@ class Specimens {
 
   std::vector<std::unique_ptr<Place>> places_;
   std::vector<const Place*> roots_;
-  std::vector<std::pair<std::string, std::string>> meanings_;  // by paths, in the order of the files and their lines
+  // Paths and comments of keys, in the order of the files and lines.
+  std::vector<std::pair<std::string, std::string>> meanings_;
 };
 
 }  // namespace proxarm::command_line

@@ -17,7 +17,7 @@ void unite(std::vector<Word>& all, const std::vector<Word>& more) {
   }
 }
 
-// Widens `a` to all values that a or b accepts.
+// Widens `a` to all values that `a` or `b` accepts.
 void unite(Alternative& a, const Alternative& b) {
   if (b.range.min < a.range.min) a.range.above_min = b.range.above_min;
   if (b.range.min == a.range.min) a.range.above_min = a.range.above_min && b.range.above_min;
@@ -57,14 +57,14 @@ MapModel wide(const MapModel& map) {
   return all;
 }
 
-// Finds a key; `map` may be const.
+// Returns the key of this name, const if `map` is. Throws SetupError if there is none.
 auto& key_of(auto& map, const std::string& name) {
   const auto found = std::ranges::find(map.keys, name, &KeyModel::name);
   if (found != map.keys.end()) return *found;
   throw description::SetupError({.key = map.path + "." + name, .message = "the specimens don't have this key"});
 }
 
-// Finds a map such as drives[].simulation, by the first case of each key.
+// Returns the map at a path such as drives[].simulation. Of each key on the path, the first case counts.
 const MapModel& map_at(const MapModel& root, const std::string& path) {
   const MapModel* map = &root;
   std::istringstream names(path);
@@ -76,7 +76,8 @@ const MapModel& map_at(const MapModel& root, const std::string& path) {
   return *map;
 }
 
-// Makes the list's maps accept defaults from the keys in `sharing`: no key is required while one of these is present.
+// Changes the list `key` so that its maps may get their keys from the maps of defaults in `sharing`: in a file with one
+// of these, the list's maps require no key.
 void widen_list(KeyModel& key, const std::vector<std::string>& sharing) {
   KeyCase any = key.cases.front();
   any.is_wide = true;
@@ -91,7 +92,8 @@ void widen_list(KeyModel& key, const std::vector<std::string>& sharing) {
 }  // namespace
 
 void share_keys(MapModel& root, const Specimens& specimens) {
-  std::vector<std::pair<std::string, std::vector<std::string>>> lists;  // with the keys that hold their defaults
+  // Keys of lists, each with the keys of the maps of defaults that apply to the list's maps.
+  std::vector<std::pair<std::string, std::vector<std::string>>> lists;
   for (KeyModel& key : root.keys) {
     const std::string path = specimens.shared_by(root.path, key.name);
     if (path.empty()) continue;

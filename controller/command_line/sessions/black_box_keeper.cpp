@@ -38,7 +38,7 @@ controller::BoxSize size_for(const PreparedSession& session, const RunOptions& o
 struct BlackBoxKeeper::Shared {
   controller::ReplayHead head;
   std::array<char, 2048> reason{};
-  std::atomic<bool> written{false};  // by the keeper, once everything is on the disk
+  std::atomic<bool> written{false};  // set by the keeper when everything is on the disk
 };
 
 namespace {
@@ -93,7 +93,7 @@ bool BlackBoxKeeper::finish(const std::string& reason) {
   return shared_->written.load();
 }
 
-// Runs in the keeper's process.
+// Waits for the session's end, and writes the box if necessary. Runs in the keeper's process.
 void BlackBoxKeeper::keep(int said) {
   prctl(PR_SET_NAME, "proxarm-box");
   ignore_ending_signals();
@@ -105,7 +105,8 @@ void BlackBoxKeeper::keep(int said) {
   const bool died = got <= 0;
   if (!died && word == 'f') _exit(0);
   try {
-    // A session that ended before its first cycle has reported that already, and there is nothing to write.
+    // If the session ended before its first cycle, there is nothing to write, and the session has reported the reason
+    // itself.
     if (box_.cycles() > 0) {
       write(died ? "The session ended without a word: the program crashed or was killed." : shared_->reason.data());
       if (died) std::fprintf(stderr, "proxarm: the session died; its black box is in %s\n", folder_.c_str());

@@ -1,8 +1,9 @@
-// Writes the black box from a separate process when a session ends in a fault or crashes.
+// Writes the black box from a separate process, the keeper, when a session ends in a fault or crashes.
 //
-// The process is forked before the session opens files or starts threads. It shares the box's memory and sleeps until
-// its pipe reports the session's end or closes. A signal handler could only make async-signal-safe calls on a damaged
-// stack and heap, and would never see SIGKILL. The cycle has no extra work.
+// The keeper is forked before the session opens files or starts threads. It shares the box's memory, and sleeps until
+// its pipe reports the session's end or closes. A signal handler in the session's own process couldn't replace it:
+// after a crash the handler could make only async-signal-safe calls, on a damaged stack and heap, and no handler sees
+// SIGKILL. The cycle does no work for the keeper.
 #pragma once
 
 #include <filesystem>
@@ -21,14 +22,15 @@ class BlackBoxKeeper {
   BlackBoxKeeper(const PreparedSession& session, const RunOptions& options);
   BlackBoxKeeper(const BlackBoxKeeper&) = delete;
   BlackBoxKeeper& operator=(const BlackBoxKeeper&) = delete;
-  ~BlackBoxKeeper();  // writes the box unless finish() was called
+  ~BlackBoxKeeper();  // the keeper writes the box, unless finish() was called
 
   [[nodiscard]] controller::BlackBox& box() noexcept { return box_; }
   // Sets which buses the session is on. Call it before the first cycle.
   void set_head(const controller::ReplayHead& head) noexcept;
   [[nodiscard]] const controller::ReplayHead& head() const noexcept;
-  // Ends the session. `reason` names its fault; empty: no fault. With a fault the box is written before this returns,
-  // or an error is printed on standard error. Returns whether it was written.
+  // Tells the keeper that the session has ended. `reason` names the session's fault; empty: no fault. After a fault,
+  // waits until the keeper has written the box or has printed an error on standard error. Returns whether the box was
+  // written.
   bool finish(const std::string& reason);
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
 

@@ -39,7 +39,7 @@ using controller::CycleRecord;
 using fieldbus::SocketCanNetwork;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr std::size_t record_capacity = 8192;  // 8 s at 1 kHz, in case a disk takes that long
+constexpr std::size_t record_capacity = 8192;  // 8 s at 1 kHz, in case the disk blocks for that long
 constexpr std::size_t frame_capacity = 262144;
 constexpr auto drain_interval = std::chrono::milliseconds(5);
 
@@ -49,7 +49,7 @@ std::vector<std::string> names_in(fieldbus::CanNetwork& network) {
   return names;
 }
 
-// Bitrates by bus of the network: the slowest of the cell's buses that share an interface.
+// Returns the bitrates of each bus of the network: those of the slowest of the cell's buses that share the interface.
 std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const controller::BusIndices& indices) {
   const std::size_t buses = indices.empty() ? 0 : *std::max_element(indices.begin(), indices.end()) + 1;
   std::vector<fieldbus::BitRates> rates(buses, {0, 0});
@@ -62,8 +62,9 @@ std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const c
   return rates;
 }
 
-// Takes records and frames out of the cycle's rings in a separate thread and passes them on. Since a virtual interface
-// takes no time, it also counts how long the frames would occupy a bus with the cell's bitrates.
+// Takes records and frames out of the cycle's rings in a separate thread, and passes them on to the output. It also
+// counts how long the frames would occupy a bus with the cell's bitrates, because on a virtual interface frames take no
+// time.
 class Drain {
  public:
   Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output,
@@ -85,14 +86,14 @@ class Drain {
   Drain& operator=(const Drain&) = delete;
   ~Drain() { join(); }
 
-  // Throws the exception that stopped the record, if any.
+  // Ends the thread and drains the rings. If an exception had stopped the thread, throws that exception.
   void finish() {
     join();
     if (failure_) std::rethrow_exception(failure_);
     drain();
   }
 
-  // Call after finish(). Returns the load of each interface, by name.
+  // Returns the load of each interface by its name. Call this function after finish().
   [[nodiscard]] std::map<std::string, double> loads() const {
     std::map<std::string, double> loads;
     for (std::size_t bus = 0; bus < busy_ns_.size() && last_ns_ > begun_ns_; ++bus) {
@@ -107,7 +108,8 @@ class Drain {
     ended_.store(true, std::memory_order_release);
     thread_.join();
   }
-  // An exception must not leave the thread while the arm moves: first the session makes a controlled stop.
+  // Drains the rings until the session ends. An exception must not leave this thread while the arm moves, so it is
+  // kept, and the session makes a controlled stop first.
   void loop() {
     try {
       while (!ended_.load(std::memory_order_acquire)) {
@@ -146,7 +148,7 @@ class Drain {
   controller::ReplayRecorder* replay_;
   controller::RecordedMessages* messages_;
   std::function<void()> on_failure_;
-  std::exception_ptr failure_;  // set by the thread; read after it has ended
+  std::exception_ptr failure_;  // set by the thread, and read after the thread has ended
   std::vector<std::int64_t> busy_ns_;
   std::int64_t begun_ns_;
   std::int64_t last_ns_ = 0;
@@ -167,9 +169,9 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
 
   scenes::CompiledScene scene = scenes::compile(session.scene);
   controller::FrameTap tap(network, frame_capacity);
-  controller::CycleParts parts =
-      controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices,
-                              controller::opener_of(fieldbus::ModbusPeers::any));  // consent was given above
+  // Any Modbus peer is allowed, because require_hardware_consent() was called above.
+  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, tap,
+                                                         indices, controller::opener_of(fieldbus::ModbusPeers::any));
   SessionOutput output(session, options, false);
   std::unique_ptr<controller::ReplayRecorder> replay;
   std::unique_ptr<controller::RecordedMessages> messages;

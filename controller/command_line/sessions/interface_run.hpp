@@ -1,4 +1,4 @@
-// `proxarm run --bus can0`: the controller on CAN interfaces of the kernel, in real time.
+// Runs `proxarm run --bus can0`: the controller on CAN interfaces of the kernel, in real time.
 #pragma once
 
 #include "controller/command_line/preparation/prepared_session.hpp"
@@ -6,8 +6,8 @@
 
 namespace proxarm::command_line {
 
-// Returns the exit status; throws SetupError only while nothing has moved. Real interfaces need consent
-// (live/hardware_consent.hpp).
+// Runs the session and returns the exit status. Throws SetupError only before the arm moves. Real interfaces need
+// consent (live/hardware_consent.hpp).
 int run_on_interfaces(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper);
 
 }  // namespace proxarm::command_line

@@ -21,10 +21,10 @@ using controller::CycleRecord;
 using controller::Summary;
 
 constexpr const char* default_plot = "proxarm-run.svg";
-// A force of this many times empty_handle_N is above the band of an empty handle, even while the tool rings.
+// A force above empty_handle_N times this factor isn't from an empty handle, even while the tool rings.
 constexpr double felt_bands = 4.0;
 
-// Says when each clock of the scripts started; empty without a script.
+// Returns a text that says when the clocks of the scripts started; empty without a script.
 std::string clocks_text(const Summary& summary, const RunOptions& options) {
   if (options.faults.empty() && options.changes.empty() && options.orders.empty() && options.enabling.empty())
     return "";
@@ -61,9 +61,9 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
 }
 
 namespace {
-// The stability check models a rigid arm, so it doesn't see this ringing of the gears.
+// Warns if the setpoints may make the gears ring. The stability check doesn't see this ringing.
 void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
-  constexpr double most_modes = 3.0;  // measured: docs/studies.md
+  constexpr double most_modes = 3.0;  // measured (docs/studies.md)
   const double bandwidth_Hz = cell.limits.setpoint_bandwidth_Hz;
   if (!(bandwidth_Hz >= most_modes * mode_Hz)) return;
   std::fprintf(
@@ -76,7 +76,8 @@ void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
 }  // namespace
 
 namespace {
-// Says what an arm with more or fewer than six axes does with them, if its drives take positions.
+// Returns a text that says how an arm of the admittance type with more or fewer than six axes moves; empty for six
+// axes.
 std::string axes_text(int axes, int dimensions) {
   if (axes == 6) return "";
   const std::string count = std::to_string(axes) + (axes == 1 ? " axis" : " axes");
@@ -92,7 +93,7 @@ void SessionOutput::introduce() const {
   const models::Arm& arm = deriver_.arm();
   const double mode_Hz = arm.first_elastic_frequency_Hz(arm.start_rad());
   if (!session_.impedance()) warn_if_it_chatters(session_.cell, mode_Hz);
-  if (options_.json) return;  // then only the summary goes to standard output
+  if (options_.json) return;  // with --json only the summary goes to standard output
   const models::ToolSpace reach = models::tool_space(arm);
   const models::TipMass tip = arm.effective_mass_range(arm.start_rad(), reach.dimensions);
   std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
@@ -109,7 +110,7 @@ void SessionOutput::introduce() const {
   std::fflush(stdout);
 }
 
-// Printed on standard error when it matters.
+// If the session holds or was stopped by a fault, prints on standard error how a pinned person gets free.
 void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
   const std::string& brakes = session_.cell.supervision.brake_release;
   const std::string by_hand = brakes.empty() ? "" : "; brakes: " + brakes;
@@ -126,7 +127,8 @@ void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
   }
 }
 
-// Printed on standard error: the client who asked was told only that the change began.
+// Prints on standard error whether the drives took a new timestep. The client who asked for the timestep was told only
+// that the change began.
 void SessionOutput::say_timestep(const CycleRecord& record) {
   if (record.refused_period_ns > 0) {
     std::fprintf(stderr,
@@ -156,7 +158,8 @@ void SessionOutput::say_oscillation() {
   told_oscillation_ = present.lasts;
 }
 
-// Warns on standard error if a force that no longer counts as a hand's is one that a person could feel.
+// Warns on standard error if the session takes the handle for empty although a force is measured that a person could
+// feel.
 void SessionOutput::say_belief(const CycleRecord& record) {
   const bool off = record.has(controller::RecordFlag::hands_off);
   const double force_N = controller::vec3(record.force_W_N).norm();
@@ -191,7 +194,8 @@ void SessionOutput::say_lateness(const CycleRecord& record) const {
                1e-9 * static_cast<double>(record.time_ns), 1e-6 * static_cast<double>(record.period_ns));
 }
 
-// Reported on standard error, as only the start pose was judged at the start. A user who forced an unstable mass knows.
+// Reports on standard error the unstable places that the arm passed, because at the session's start only the start pose
+// was judged. With --force-unstable nothing is reported, because the user knows that the mass is unstable.
 void SessionOutput::say_poses() {
   for (const controller::UnstablePlaces& there : poses_->news()) {
     if (options_.force_unstable) continue;
@@ -211,7 +215,8 @@ CycleRecord SessionOutput::add(const CycleRecord& record) {
 }
 
 void SessionOutput::tell(const CycleRecord& record) {
-  // A hold for a change of the timestep ends by itself. If it doesn't, it is reported once the change is over.
+  // A hold that is needed to change the timestep isn't reported, because it ends by itself. If the hold goes on when
+  // the change is over, it is reported.
   if (record.phase != controller::Phase::holding || !record.has(controller::RecordFlag::timestep)) {
     if (record.phase != last_phase_) say_how_to_get_free(record.phase);
     last_phase_ = record.phase;
@@ -250,7 +255,7 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
 
 int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   progress_.clear();
-  // Faults that were reset come first.
+  // Faults that were reset come first in the list, so the last fault tells whether a fault ended the session.
   const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
   if (options_.view_place) {
     summary.view = {options_.view_place->port, options_.view_place->most_viewers, options_.view_control};
@@ -277,7 +282,7 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
 
 bool SessionOutput::draw_plot(const Summary& summary) {
   if (!plot_) return true;
-  if (plot_->is_empty()) {  // stopped before rendering; the user knows
+  if (plot_->is_empty()) {  // the session ended before rendering
     if (!options_.json) std::printf("  plot:                     none; nothing was rendered\n");
     return true;
   }

@@ -1,4 +1,5 @@
-// Makes a session's summary, plot and record. It gets every record in order, outside the cycle.
+// Makes a session's summary, plot and recorded files. It gets the records of all cycles in order, outside the cycle's
+// thread.
 #pragma once
 
 #include <chrono>
@@ -23,23 +24,24 @@ namespace proxarm::command_line {
 
 class SessionOutput {
  public:
-  // Makes the record's folder if wanted; throws SetupError. `with_truth`: records hold the simulation's truth.
+  // Makes the folder for recorded files if the options ask for one. `with_truth`: the records of cycles hold the
+  // simulation's truth. Throws SetupError.
   SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth);
 
-  // Prints what the user should know before the arm moves. Call it once signals are watched, as the user may want to
-  // stop.
+  // Prints what the user should know before the arm moves. Call this function after signals are watched, as the user
+  // may then want to stop the session.
   void introduce() const;
-  // Completes the record with what only the scene gives (distances, friction), and processes it. Returns the completed
-  // record.
+  // Completes a cycle's record with the quantities for which the scene is needed (distances, friction), and takes it
+  // into summary, plot and files. Returns the completed record.
   controller::CycleRecord add(const controller::CycleRecord& record);
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
 
-  // Summarises all records and the cycle's results; the caller adds what only it knows before finish(). `cause`
-  // explains SessionEnd::asked.
+  // Returns the summary of all records and of the cycle's results. Before finish(), the caller adds what only the
+  // caller knows. `cause` explains SessionEnd::asked.
   [[nodiscard]] controller::Summary summary(const controller::Cycle& cycle, controller::SessionEnd end,
                                             const EndingCause& cause);
-  // Writes files, draws the plot, prints the summary on standard output, and after a fault has the black box written.
-  // Returns the exit status.
+  // Writes the files, draws the plot, and prints the summary on standard output. After a fault, makes the keeper write
+  // the black box. Returns the exit status.
   int finish(controller::Summary summary, BlackBoxKeeper& keeper);
 
  private:
@@ -60,13 +62,14 @@ class SessionOutput {
   std::unique_ptr<controller::PlotBuilder> plot_;
   std::unique_ptr<controller::SessionWriter> writer_;
   controller::SignalDeriver deriver_;
-  std::unique_ptr<controller::LedPoses> poses_;  // admittance type
-  std::optional<controller::Swing> swing_;       // of a tool that is turned
-  std::chrono::steady_clock::duration spent_{};  // on records and figures
+  std::unique_ptr<controller::LedPoses> poses_;  // null for the impedance type
+  std::optional<controller::Swing> swing_;       // of a tool that the hand turns
+  std::chrono::steady_clock::duration spent_{};  // time spent on records
   std::int64_t rendered_ns_ = 0;
-  std::int64_t told_period_ns_ = 0;             // the timestep last reported to the user
-  bool told_oscillation_ = false;               // reported for the present spell
-  bool was_off_ = false, told_belief_ = false;  // nobody held the handle in the previous cycle; that was reported
+  std::int64_t told_period_ns_ = 0;  // the timestep that was last reported to the user
+  bool told_oscillation_ = false;    // whether the present spell was reported
+  // Whether nobody held the handle in the previous cycle, and whether that was reported.
+  bool was_off_ = false, told_belief_ = false;
   controller::Phase last_phase_ = controller::Phase::idle;
 };
 

@@ -20,8 +20,8 @@ using controller::Cycle;
 using controller::CycleRecord;
 using SteadyClock = std::chrono::steady_clock;
 
-// Makes virtual time keep pace with the wall clock, for viewers: each cycle waits until it is due. No cycle is skipped,
-// and the setpoints are the same to the bit as without waiting.
+// Makes virtual time keep pace with the wall clock, for viewers: each cycle waits until its time has come on the wall
+// clock. No cycle is skipped, and the setpoints are equal to the bit to those of a run without waiting.
 class Spectator {
  public:
   explicit Spectator(bool looks) : looks_(looks) {}

@@ -1,4 +1,4 @@
-// `proxarm run --bus sim`: controller and simulated arm in one process, on in-process buses.
+// Runs `proxarm run --bus sim`: controller and simulated arm in one process, on in-process buses.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ class SimulatedRun {
   SimulatedRun(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
                BlackBoxKeeper& keeper);
 
-  // Returns the exit status; throws SetupError only while nothing has moved.
+  // Runs the session and returns the exit status. Throws SetupError only before the arm moves.
   int run();
 
  private:

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 using description::Json;
 using description::SetupError;
 
-constexpr int answer_within_ms = 30'000;  // a mesh without a cache may take a while
+constexpr int answer_within_ms = 30'000;  // loading a mesh that isn't cached may take long
 // The descriptors' numbers in the view's process.
 constexpr int memory_there = 3, line_there = 4;
 
@@ -34,7 +34,8 @@ constexpr int memory_there = 3, line_there = 4;
   throw SetupError({.key = "--view", .found = found, .expected = expected, .advice = advice});
 }
 
-// The view's process reads the files again.
+// Returns the file's path. Throws SetupError if the file can be read only once, because the view's process reads the
+// files again.
 std::string readable_twice(const fs::path& file, const char* option) {
   std::error_code error;
   if (!file.empty() && !fs::is_regular_file(file, error)) {
@@ -66,13 +67,13 @@ Json hello_of(const PreparedSession& session, const RunOptions& options, ViewPro
             {"impedance", session.impedance()}}}};
 }
 
-// Returns false if the reader is gone.
+// Sends a value as one line of JSON. Returns false if the reader is gone.
 bool send_line(int line, const Json& value) {
   const std::string text = value.dump() + "\n";
   return send(line, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
 }
 
-// Empty if no line comes in time.
+// Returns the next line; empty if no line comes within answer_within_ms.
 std::string read_line(int line) {
   std::string text;
   for (char letter = 0; letter != '\n'; text += letter) {
@@ -152,7 +153,7 @@ void ViewProcess::greet(const PreparedSession& session, const RunOptions& option
 void ViewProcess::show_end(int exit_status) {
   if (!send_line(line_, {{"ended", "the session is over"}, {"exit_status", exit_status}})) return;
   std::atomic<bool> asked{false};
-  SignalWatch signals([&] { asked.store(true); });  // watched before the message offers Ctrl-C
+  SignalWatch signals([&] { asked.store(true); });  // before the message offers Ctrl-C
   std::fprintf(stderr, "proxarm: the session is over; its view stays at %s until Ctrl-C\n", url_.c_str());
   while (!asked.load() && waitpid(child_, nullptr, WNOHANG) == 0) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));

@@ -1,8 +1,8 @@
-// The session's side of the view: starts the process that shows the session, and tells it what to show and how the
-// session ended.
+// Starts the process that shows the session, the view's process, and tells it what to show and how the session ended.
 //
-// That process (command_line/view/live_view.hpp) is another program, so the session has none of its code in memory. It
-// only reads the black box's memory. If it crashes, the session goes on unchanged.
+// The view's process runs another program (command_line/view/live_view.hpp), so the session has none of the view's code
+// in memory. Of the session's memory, the view's process has only the black box, and only reads it. If the view
+// crashes, the session goes on unchanged.
 #pragma once
 
 #include <cstdint>
@@ -20,11 +20,11 @@ class ViewProcess {
  public:
   enum class Shows : std::uint8_t {
     session,
-    simulated_arm,  // no proxy, and no scene unless --scene names one
+    simulated_arm,  // without a proxy, and without a scene unless --scene names one
   };
 
-  // Starts the process and prints the URL on standard error. `memory` is the black box's descriptor. Precondition: no
-  // other thread runs yet. Throws SetupError if the session can't be shown.
+  // Starts the view's process and prints the view's URL on standard error. `memory` is the descriptor of the black
+  // box's memory. Precondition: no other thread runs yet. Throws SetupError if the session can't be shown.
   ViewProcess(const PreparedSession& session, const RunOptions& options, int memory, Shows shows = Shows::session);
   ViewProcess(const ViewProcess&) = delete;
   ViewProcess& operator=(const ViewProcess&) = delete;
@@ -32,7 +32,8 @@ class ViewProcess {
 
   [[nodiscard]] const ViewPlace& place() const noexcept { return place_; }
 
-  // Tells the viewers that the session is over. The view stays until a signal comes or its process ends.
+  // Tells the viewers that the session is over. Returns when a signal comes or the view's process ends; until then the
+  // view stays.
   void show_end(int exit_status);
 
  private:
@@ -46,12 +47,13 @@ class ViewProcess {
   int child_ = -1;
 };
 
-// Sends the viewers the present margin to instability. Doesn't block.
+// Sends the viewers the margin to instability at the place that was judged last. Doesn't block.
 void tell_margin(const ViewPlace& place, const controller::PassedPoses::Place& judged);
 
-// The socket of --view-control without --control, for this session only.
+// Returns the path of the control socket that --view-control uses if --control isn't given. The path differs for each
+// session.
 std::filesystem::path view_control_path();
-// Removes what is left of that socket.
+// Removes the files that are left of the socket at view_control_path().
 void remove_view_control();
 
 }  // namespace proxarm::command_line

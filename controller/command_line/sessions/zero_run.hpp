@@ -1,4 +1,5 @@
-// The zero of the force sensor: a session compares its tare with it, and keeps the new one afterwards.
+// Reads the force sensor's zero before a session, which compares its tare with it, and writes the new zero after the
+// session.
 #pragma once
 
 #include <string>
@@ -10,15 +11,15 @@
 
 namespace proxarm::command_line {
 
-// Gives the session the zero kept beside its cell. Without one, a simulated sensor keeps the zero that it has, and a
-// real sensor's is taken as 0.
+// Puts the zero that is kept beside the cell into the session's settings. If none is kept, a real sensor's zero is
+// taken as 0, and for a simulated sensor the settings stay unchanged.
 void know_zero(PreparedSession& session, const RunOptions& options);
 
-// Returns the zero that this cycle has tared and followed.
+// Returns the zero that the cycle has tared, with the drift that it has followed since.
 ZeroFile zero_of(const PreparedSession& session, const controller::Cycle& cycle, bool real_arm);
 
-// Keeps the zero after a session without a fault on a real arm. With --accept-force it isn't kept, since it may contain
-// a hand's force.
+// Writes the zero beside the cell after a session on a real arm that rendered and ended without a fault. With
+// --accept-force the zero isn't written, because it may contain a hand's force.
 void keep_zero(const PreparedSession& session, const RunOptions& options, const std::vector<std::string>& interfaces,
                const controller::Cycle& cycle);
 

@@ -23,7 +23,8 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   if (turns) {
     options.inertia_kg_m2 = setup.inertia_kg_m2;
     options.hand = shipped_file("sim/hands/wobble.yaml");
-    // With such a tool the wrist oscillates at 3 Hz, above the band of voluntary hand motion; here the hand means to.
+    // With a tool that turns, the wrist swings at 3 Hz and above. That is faster than voluntary hand motion, so
+    // passivity would add damping; but here the hand means the motion.
     options.passivity = controller::Passivity::off;
   }
   options.scene = shipped_file(setup.wall ? "scenes/frictionless_wall.yaml" : "scenes/free.yaml");
@@ -34,12 +35,12 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   session.hand.waypoints.clear();
   session.hand.multisine.clear();
   if (setup.wall) {
-    // Leans 30 mm into the wall, which is 0.2 m away.
+    // The hand leans 30 mm into the wall, which is 0.2 m away.
     session.hand.waypoints = {{0.0, {0.0, 0.0, 0.0}}, {2.0, {0.23, 0.0, 0.0}}};
   }
   const models::Vec3 along = models::Vec3::Unit(setup.axis);
   for (std::size_t i = 0; i < setup.sines.size(); ++i) {
-    // The sines alternate in sign, so that the hand starts about where the tool is.
+    // Every other sine has the opposite sign, so that the hand starts near the tool.
     session.hand.multisine.push_back({.frequency_Hz = setup.sines[i].frequency_Hz,
                                       .amplitude_m = turns ? 0.0 : setup.sines[i].amplitude,
                                       .amplitude_rad = turns ? setup.sines[i].amplitude : 0.0,

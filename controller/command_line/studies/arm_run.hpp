@@ -6,7 +6,7 @@
 
 namespace proxarm::command_line {
 
-// Both throw SetupError and may be called by several threads.
+// Both functions throw SetupError, and may be called by several threads at once.
 std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup);
 studies::CycleCounts count_cycles(const studies::CycleSetup& setup);
 

@@ -1,6 +1,7 @@
-// The program that `proxarm study` becomes. It is separate because the studies take a sixth of proxarm's compile time.
+// Defines the program that `proxarm study` becomes. It is a separate program because the studies take a sixth of
+// proxarm's compile time.
 //
-// Exit status: 0 fine, 1 an invariant was violated, 2 set-up mistake.
+// Exit status: 0: fine; 1: an invariant was violated; 2: set-up mistake.
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>

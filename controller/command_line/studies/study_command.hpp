@@ -1,4 +1,4 @@
-// `proxarm study`: its options, and the function that runs it.
+// Runs `proxarm study`.
 #pragma once
 
 #include <cstdint>
@@ -18,10 +18,10 @@ struct StudyOptions {
   std::optional<double> runs;
   unsigned threads = 0;
   std::optional<std::uint64_t> replay;
-  std::string command_line;  // for the record
+  std::string command_line;  // the command as typed, for the study's JSON file
 };
 
-// Returns what a study measures and writes, for its help; empty if there is no study of that name.
+// Returns the help of a study, which says what the study measures and writes; empty if no study has that name.
 std::string study_description(const std::string& name);
 int study_command(const StudyOptions& options);
 

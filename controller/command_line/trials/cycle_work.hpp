@@ -1,4 +1,4 @@
-// Counts what a session's cycles compute beyond 𝒢, and what they can skip.
+// Counts what a session's cycles compute besides 𝒢, and what they can skip.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace proxarm::command_line {
 
-// Counts over a session on the simulated arm. Throws SetupError if the session can't begin.
+// Runs the session on the simulated arm and counts. Throws SetupError if the session can't begin.
 controller::MotionWork count_work(const PreparedSession& session);
 
 std::string work_text(const PreparedSession& session, const controller::MotionWork& work);

@@ -10,7 +10,8 @@ using controller::HandModel;
 using controller::LoopModel;
 using controller::PoseLoopModel;
 
-// Returns the hand in rotation, made stiffer and heavier by the same factors as `other_place` against `place`.
+// Returns the hand in rotation, `turning`, made stiffer and heavier by the factors by which `other_place` is stiffer
+// and heavier than `place`.
 HandModel likewise(const HandModel& turning, const HandModel& place, const HandModel& other_place) {
   HandModel other = turning;
   other.stiffness_N_per_m *= other_place.stiffness_N_per_m / place.stiffness_N_per_m;
@@ -18,7 +19,7 @@ HandModel likewise(const HandModel& turning, const HandModel& place, const HandM
   return other;
 }
 
-// Returns the smallest inertia of at least `least_kg_m2` that is stable in all poses.
+// Returns the smallest inertia of at least `least_kg_m2` that is stable in all of the poses; nullopt if there is none.
 std::optional<double> smallest_in(const PreparedSession& session, const PoseLoopModel& model,
                                   const std::vector<models::JointVector>& poses_rad, double least_kg_m2) {
   const models::Arm arm(session.cell);

@@ -1,5 +1,5 @@
-// The inertia that `tune` advises for a tool that is moved and turned at once. By the eigenvalues of the pose loop it
-// is stable with margins in all poses that the hand leads to.
+// Computes the inertia that `tune` advises for a tool that is moved and turned at once. By the eigenvalues of the pose
+// loop, that inertia is stable with margins in all poses to which the hand leads the arm.
 #pragma once
 
 #include <optional>
@@ -8,13 +8,14 @@
 
 namespace proxarm::command_line {
 
-// Felt inertias (kg m²), load behind the sensor included; absent: no inertia is stable with the session's mass.
+// The smallest stable inertias as the hand feels them (kg m²), the load behind the sensor included. Absent: no inertia
+// is stable with the session's mass.
 struct SmallestInertias {
   std::optional<double> at_start, everywhere;
-  std::optional<double> with_margins;  // as `everywhere`, with the margins of controller::with_margins for the hand's
-                                       // translation and rotation
+  // As `everywhere`, but with the margins of controller::with_margins for the hand's translation and rotation.
+  std::optional<double> with_margins;
 };
-// Precondition: the session has a turned_model().
+// Computes these inertias. Precondition: turned_model() returns a model for the session.
 SmallestInertias smallest_inertias(const PreparedSession& session);
 
 }  // namespace proxarm::command_line

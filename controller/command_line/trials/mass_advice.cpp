@@ -19,7 +19,7 @@ std::optional<double> smallest_with_margins(const HandModel& hand, const LoopMod
 }
 
 std::optional<controller::DampedMass> worthwhile_damping(const HandModel& hand, const LoopModel& loop) {
-  constexpr double worth = 0.5;  // of the mass without damping
+  constexpr double worth = 0.5;  // as a share of the mass without added damping
   const auto smallest = [&](const LoopModel& damped) -> std::optional<double> {
     if (damped.damping_Ns_per_m > most_for_comfort_Ns_per_m) return std::nullopt;
     return smallest_with_margins(hand, damped);

@@ -1,5 +1,5 @@
-// The mass that `tune` and `new-cell` advise before it is tried (trial.hpp). By the eigenvalues of the closed loop it
-// is stable with margins.
+// Computes the mass that `tune` and `new-cell` advise; trial.hpp then tries it. By the eigenvalues of the closed loop,
+// that mass is stable with margins.
 #pragma once
 
 #include <optional>
@@ -8,13 +8,13 @@
 
 namespace proxarm::command_line {
 
-// Returns the felt mass, handle included, at which the loop is just stable with the margins of
-// controller::with_margins: also for a stiffer and heavier hand, and for a longer delay.
+// Returns the smallest felt mass, handle included, with which the loop is stable with the margins of
+// controller::with_margins: also with a stiffer and heavier hand, and with a longer delay.
 std::optional<double> smallest_with_margins(const controller::HandModel& hand, const controller::LoopModel& loop);
 
-// Returns the least of controller::tried_dampings with which the mass with margins is at most half of the mass without
-// damping; nullopt if there is none. It is at most 20 Ns/m: at 0.2 m/s that is 4 N, which a hand takes for a heavier
-// handle.
+// Returns the smallest of controller::tried_dampings with which smallest_with_margins() is at most half of what it is
+// without added damping; nullopt if there is none. The damping is at most 20 Ns/m: at 0.2 m/s that gives 4 N, which a
+// hand still takes for a heavier handle, not for resistance.
 inline constexpr double most_for_comfort_Ns_per_m = 20.0;
 std::optional<controller::DampedMass> worthwhile_damping(const controller::HandModel& hand,
                                                          const controller::LoopModel& loop);

@@ -1,4 +1,4 @@
-// Tries a mass or an inertia on the simulated arm, to confirm the stability check before `tune` advises the value.
+// Tries a mass or an inertia on the simulated arm before `tune` advises it, to confirm the stability check.
 #pragma once
 
 #include <optional>
@@ -15,19 +15,19 @@ struct Trial {
   [[nodiscard]] bool steady() const noexcept { return !oscillation.lasts && fault.empty(); }
 };
 
-// Runs the session without lookahead and without added damping. The hand's stiffness and mass are multiplied by
-// hand_factor. Throws SetupError if the session can't begin.
+// Runs the session without lookahead and without the damping that passivity adds. The hand's stiffness and mass are
+// multiplied by hand_factor. Throws SetupError if the session can't begin.
 Trial try_out(PreparedSession session, double hand_factor);
 
 struct TriedAdvice {
-  std::optional<double> steady;  // the first steady value; absent: none of the six tried was steady
+  std::optional<double> steady;  // the first value that was steady; absent: none of the six tried values was
   std::string text;
 };
-// Tries a felt mass or a felt inertia on the simulated arm. While it isn't steady, tries values that grow by a quarter.
+// Try a felt mass or a felt inertia on the simulated arm. Until a value is steady, the next value is a quarter larger.
 TriedAdvice tried_mass(const PreparedSession& session, double mass_kg);
 TriedAdvice tried_inertia(const PreparedSession& session, double inertia_kg_m2);
 
-// Rounds up to two significant digits.
+// Returns the value rounded up to two significant digits.
 double rounded_up(double value);
 
 }  // namespace proxarm::command_line

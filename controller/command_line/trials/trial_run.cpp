@@ -16,13 +16,13 @@ namespace {
 
 using assessment::Stop;
 
-// The sensor is tared and the hand's force is let in before the hand leads: 0.2 s each by default.
+// Time from the end of the tare and of the force's ramp to the hand's first motion.
 constexpr double lead_from_s = 0.3;
-// The hand leads for lead_s on a minimum-jerk path. The path's greatest speed is 15/8 of its mean and 1.2 times the
-// tool's speed limit, so the tool runs at its limit in the middle.
+// The hand leads the tool for lead_s on a minimum-jerk path. The path's greatest speed is 15/8 of the mean speed, and
+// 1.2 times the tool's speed limit. So in the middle of the path the tool moves at its speed limit.
 constexpr double lead_s = 0.94, lead_over_limit = 1.2, peak_of_minimum_jerk = 15.0 / 8.0;
-// How long a trial is observed after the stop, and after the tool has met a body: four times the duration up to which a
-// contact counts as short.
+// How long a trial is observed after the stop, and after the tool has met a body. The second time is four times the
+// duration up to which a contact counts as short.
 constexpr double after_stop_s = 1.0, after_contact_s = 4.0 * assessment::quasi_static_from_s;
 
 double ramp_s(const PreparedSession& session) {
@@ -40,8 +40,8 @@ description::HandDescription hand_of(const PreparedSession& session, const asses
   const models::Vec3 way = speed_m_per_s * lead_s / peak_of_minimum_jerk * trial.direction_W;
   const double from_s = ramp_s(session);
   hand.waypoints = {{from_s, {0.0, 0.0, 0.0}}, {from_s + lead_s, {way.x(), way.y(), way.z()}}};
-  // A person who is startled by a stop lets go, evenly over a tenth of a second. So only the arm's own motion is
-  // measured.
+  // At a stop the hand lets go, like a startled person: its grip fades evenly over a tenth of a second. So the measured
+  // motion is the arm's own.
   if (trial.stop != Stop::none) hand.grips = {{trial.at_s, 0.0, 0.0}};
   return hand;
 }
@@ -64,7 +64,8 @@ std::string end_of(const controller::Supervisor& supervisor) {
   return supervisor.held_for().fault == Fault::none ? "" : controller::fault_name(supervisor.held_for().fault);
 }
 
-// The simulated arm of a trial, with the trial's body and stop. Observed times count from the hand's start.
+// Runs a trial on the simulated arm, with the trial's body and stop. The times of the result count from the hand's
+// start.
 class TrialArm {
  public:
   TrialArm(const PreparedSession& session, const assessment::Trial& trial)
@@ -101,7 +102,7 @@ class TrialArm {
                                          }};
     controller::run_session(cycle, network_, {seen_s_ + 1.0}, hooks);
     result_.end = end_.empty() ? end_of(cycle.supervisor()) : end_;
-    // The observation lasts to its end even if a fault has ended the session.
+    // If a fault has ended the session early, the arm is observed on until seen_s_.
     const sim::Truth truth = far_end_.truth();
     const auto rest_ns = static_cast<std::int64_t>(1e9 * std::max(0.0, seen_s_ - since_hand_s(truth)));
     network_.sleep_until(network_.now_ns() + rest_ns);
@@ -114,7 +115,7 @@ class TrialArm {
     return 1e-9 * static_cast<double>(truth.time_ns - truth.hand_start_ns);
   }
 
-  // Called before each cycle: begins the stop, and ends the session when the observation ends.
+  // Begins the trial's stop when it is due, and ends the session when the observation ends. Called before each cycle.
   void intervene(controller::Cycle& cycle) {
     const sim::Truth truth = far_end_.truth();
     if (!truth.hand_started) return;

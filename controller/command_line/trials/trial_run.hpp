@@ -6,8 +6,8 @@
 
 namespace proxarm::command_line {
 
-// Runs one trial. Precondition: the session is prepared and stable. The hand grips as its file says (the tightest
-// grip), but moves as the trial says. Throws SetupError if the session can't begin.
+// Runs one trial. The hand has the tightest grip of its file, and moves as the trial says. Precondition: the session is
+// prepared and stable. Throws SetupError if the session can't begin.
 assessment::TrialResult run_trial(const PreparedSession& session, const assessment::Trial& trial);
 
 }  // namespace proxarm::command_line

@@ -1,4 +1,4 @@
-// Lets the page send lines to a session's control socket, as `proxarm set` does. Answers come in the server's thread.
+// Lets the page send lines to a session's control socket, as `proxarm set` does.
 #pragma once
 
 #include <boost/asio/executor_work_guard.hpp>
@@ -14,15 +14,17 @@ class ControlLine {
  public:
   using Answered = std::function<void(const std::string& answer)>;
 
-  // `socket` empty: nothing may be asked. Precondition: `server` outlives this object.
+  // `socket` is the path of the control socket; empty: the page may ask nothing. Precondition: `server` outlives this
+  // object.
   ControlLine(std::filesystem::path socket, boost::asio::io_context& server);
   ControlLine(const ControlLine&) = delete;
   ControlLine& operator=(const ControlLine&) = delete;
   ~ControlLine();
 
   [[nodiscard]] bool open() const noexcept { return !socket_.empty(); }
-  // Asks one line after the other in a separate thread, since a session may take time to answer. `answered` gets "ok:
-  // …" or "refused: …". While eight lines wait, further ones are refused.
+  // Sends a line to the session and calls `answered` with the answer, "ok: …" or "refused: …", in the server's thread.
+  // Lines are sent one after the other in a separate thread, because a session may take time to answer. While eight
+  // lines wait, further lines are refused.
   void ask(std::string line, Answered answered);
 
  private:

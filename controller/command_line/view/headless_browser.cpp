@@ -33,7 +33,7 @@ using nlohmann::json;
 constexpr int answer_within_ms = 60'000;
 constexpr auto patience = std::chrono::seconds(60);
 
-// Finds the browser on the PATH, by one of its usual names.
+// Finds a Chromium on the PATH by its usual names.
 fs::path find_browser() {
   const char* const path = std::getenv("PATH");
   std::istringstream folders(path != nullptr ? path : "/usr/bin");
@@ -78,7 +78,7 @@ HeadlessBrowser::HeadlessBrowser(PictureSize size, bool dark) {
   attach(size, dark);
 }
 
-// --remote-debugging-pipe reads from descriptor 3 and writes to 4.
+// With --remote-debugging-pipe the browser reads from descriptor 3 and writes to descriptor 4.
 void HeadlessBrowser::start(const fs::path& program) {
   std::vector<std::string> words{program.string(),
                                  "--headless=new",
@@ -105,7 +105,8 @@ void HeadlessBrowser::start(const fs::path& program) {
   for (const int end : {to[0], from[1]}) close(end);
   to_ = to[1];
   from_ = from[0];
-  // If the browser ends at once, that is reported as an error; without this, writing to it would end the program first.
+  // If the browser ends at once, writing to its pipe raises SIGPIPE, which would end this program. With SIGPIPE ignored
+  // the write fails, and the failure is reported as an error.
   (void)std::signal(SIGPIPE, SIG_IGN);
   if (child.error != 0) throw SetupError({.file = program.string(), .message = std::strerror(child.error)});
 }
@@ -137,7 +138,7 @@ HeadlessBrowser::~HeadlessBrowser() {
   fs::remove_all(profile_, ignored);
 }
 
-// Messages end with a zero byte.
+// Reads one message. Messages end with a zero byte.
 std::string HeadlessBrowser::read_message() {
   while (true) {
     if (const std::size_t end = buffer_.find('\0'); end != std::string::npos) {
@@ -170,7 +171,7 @@ json HeadlessBrowser::command(const std::string& method, const json& parameters)
   }
   while (true) {
     const json answer = json::parse(read_message(), nullptr, false);
-    if (!answer.is_object() || answer.value("id", 0) != last_id_) continue;  // an event
+    if (!answer.is_object() || answer.value("id", 0) != last_id_) continue;  // an event, not the answer
     if (answer.contains("error")) {
       throw SetupError({.message = "the browser refuses " + method + ": " + answer["error"].value("message", "")});
     }

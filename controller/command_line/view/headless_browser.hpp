@@ -1,5 +1,5 @@
-// Drives a Chromium without a window through a pipe, by the DevTools protocol: opens an address, runs JavaScript, takes
-// pictures.
+// Controls a Chromium without a window through a pipe, by the DevTools protocol: opens an address, runs JavaScript,
+// takes pictures.
 #pragma once
 
 #include <filesystem>
@@ -14,17 +14,17 @@ struct PictureSize {
 
 class HeadlessBrowser {
  public:
-  // Throws SetupError if there is no browser or it doesn't start.
+  // Starts the browser. Throws SetupError if no browser is found or the browser doesn't start.
   explicit HeadlessBrowser(PictureSize size, bool dark);
   HeadlessBrowser(const HeadlessBrowser&) = delete;
   HeadlessBrowser& operator=(const HeadlessBrowser&) = delete;
   ~HeadlessBrowser();
 
   void open(const std::string& url);
-  // Waits until this JavaScript expression is true. Throws SetupError after a minute.
+  // Waits until the JavaScript expression is true. Throws SetupError if it isn't true within a minute.
   void wait_for(const std::string& condition);
   void run(const std::string& script);
-  // Saves a PNG. Throws SetupError if the file can't be written.
+  // Saves a picture of the page as PNG. Throws SetupError if the file can't be written.
   void save_picture(const std::filesystem::path& file);
 
  private:

@@ -103,8 +103,8 @@ class LiveView {
   }
 
  private:
-  // Lowers this process's priority once a waiting viewer has the first picture: if processors are scarce, the session
-  // goes first.
+  // Lowers this process's priority when a waiting viewer has got the first picture, so that the session goes first if
+  // processors are scarce.
   void step_back() {
     if (!std::exchange(stepped_back_, true)) (void)setpriority(PRIO_PROCESS, 0, 5);
   }
@@ -135,13 +135,14 @@ class LiveView {
           tell_spectrum();
         }
       }
-      // A machine too slow for 60 moments a second shows fewer, without a backlog.
+      // If the machine is too slow for 60 moments a second, fewer are shown, and no moments queue up.
       timer_.expires_at(std::max(timer_.expiry() + between_moments, std::chrono::steady_clock::now()));
       show();
     });
   }
 
-  // A transform of a second takes some milliseconds, and nobody can read bars that change faster.
+  // Sends the spectrum four times a second at most: transforming a second of samples takes some milliseconds, and
+  // nobody can read bars that change faster.
   void tell_spectrum() {
     const auto now = std::chrono::steady_clock::now();
     if (now < next_spectrum_ || stage_.options().arm_alone) return;
@@ -156,7 +157,7 @@ class LiveView {
     page_.say(text_of({{"status", status_}}));
   }
 
-  // Reads the session's later lines until the socket closes.
+  // Reads the session's lines after the first one, until the socket closes.
   void listen() {
     boost::asio::async_read_until(session_, lines_, '\n', [this](const error_code& error, std::size_t) {
       if (error) {
@@ -209,7 +210,8 @@ void reply(stream_protocol::socket& session, const json& answer) {
 }  // namespace
 
 int live_view(int memory, int session) {
-  ignore_ending_signals();  // Ctrl-C is for the session, which then ends this process
+  // Ctrl-C reaches both processes. Only the session obeys it; the session then ends this process.
+  ignore_ending_signals();
   boost::asio::io_context context{1};
   stream_protocol::socket line(context, stream_protocol(), session);
   std::optional<LiveView> shown;

@@ -1,6 +1,7 @@
-// The program behind `--view` and `proxarm view`. It is separate so that a session has no web server in its memory.
+// Defines the program behind `--view` and `proxarm view`. It is a separate program, so that a session has no web server
+// in its memory.
 //
-// Exit status: 0 fine, 2 set-up mistake.
+// Exit status: 0: fine; 2: set-up mistake.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -90,7 +91,7 @@ void add_options(CLI::App& app, command_line::ViewOptions& options) {
 }
 
 int run(const std::vector<std::string>& words, char** argv) {
-  // Started by a session (sessions/view_process.cpp).
+  // A session starts the program with these words (sessions/view_process.cpp).
   if (words.size() == 3 && words[0] == "--live") {
     return command_line::live_view(std::atoi(words[1].c_str()), std::atoi(words[2].c_str()));
   }

@@ -24,7 +24,7 @@ void PageChannel::closed(const SocketPtr& socket) { std::erase(sockets_, socket)
 
 std::string PageChannel::choose(const std::vector<std::string>& /*offered*/) const { return {}; }
 
-// Drops a client that sends messages which the page doesn't send.
+// Passes a page's message on. Drops the connection if the message is none that the page sends.
 void PageChannel::received(const SocketPtr& socket, std::string_view message, bool binary) {
   const json said = binary ? json() : json::parse(message, nullptr, false);
   if (wanted_ && said.is_object() && wanted_(*socket, said)) return;
@@ -39,7 +39,7 @@ void PageChannel::received(const SocketPtr& socket, std::string_view message, bo
 }
 
 void PageChannel::show(const view::Bytes& moment) {
-  const auto all = sockets_;  // a socket may go away meanwhile
+  const auto all = sockets_;  // a copy, because show() may remove a socket from `sockets_`
   for (const SocketPtr& socket : all) socket->show(moment);
 }
 

@@ -1,10 +1,15 @@
-// The messages between the page and the process over the page's WebSocket.
+// Exchanges messages with pages over their WebSockets.
 //
-// To the page, as text: JSON with one key. "stage" (view/stage/stage.hpp, with "mode" and "control"), "settings" after
-// a change (view/stage/present_settings.hpp), "status", "answer", and in a running session "spectrum" four times a
-// second (vibration.hpp). To the page, binary: moments and histories (view/stage/moment.hpp). From the page: JSON
-// {"ask": LINE, "id": N}, a line for the session's control socket, answered by {"answer": {"id": N, "text": …}}; with a
-// record, also the requests in play_view.hpp.
+// Text messages to the page are JSON with one key:
+//   "stage"      what to draw (view/stage/stage.hpp), with "mode" and "control"
+//   "settings"   the settings after a change (view/stage/present_settings.hpp)
+//   "status"     the session's status
+//   "answer"     {"id": N, "text": …}, the answer to the page's line with that id
+//   "spectrum"   in a running session, the handle's vibration, four times a second (vibration.hpp)
+// Binary messages to the page are moments and histories (view/stage/moment.hpp).
+//
+// Messages from the page are JSON: {"ask": LINE, "id": N} holds a line for the session's control socket. If a record is
+// shown, the page also sends the requests in play_view.hpp.
 #pragma once
 
 #include <functional>
@@ -19,9 +24,9 @@ namespace proxarm::command_line {
 
 class PageChannel final : public view::Channel {
  public:
-  // `welcome` sends the first messages to a page that opens.
+  // Sends the first messages to a page that has opened.
   using Welcome = std::function<void(view::Socket& socket)>;
-  // Takes messages that aren't for the control socket. False: not a message of the page.
+  // Handles a message that isn't for the control socket. Returns false if the page doesn't send such messages.
   using Wanted = std::function<bool(view::Socket& socket, const nlohmann::json& said)>;
 
   PageChannel(ControlLine& control, Welcome welcome, Wanted wanted = {});
@@ -42,7 +47,7 @@ class PageChannel final : public view::Channel {
   std::vector<view::SocketPtr> sockets_;
 };
 
-// Encodes a message of JSON.
+// Returns JSON as the bytes of a text message.
 view::Bytes text_of(const nlohmann::json& value);
 
 }  // namespace proxarm::command_line

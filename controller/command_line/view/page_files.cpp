@@ -29,7 +29,7 @@ view::AssetPtr mesh_file(const view::Stage& stage, const std::string& path) {
     return std::make_shared<const view::Asset>(
         view::Asset{"application/octet-stream", stage.mesh_bytes(link, index), {}});
   } catch (const description::SetupError&) {
-    return nullptr;  // the page draws everything else
+    return nullptr;  // the page draws everything else without this mesh
   }
 }
 

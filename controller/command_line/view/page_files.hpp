@@ -1,4 +1,5 @@
-// The files of the page: its own and three.js, read once, and the meshes of what it shows.
+// Provides the files of the page: the page's own files and three.js, which are read once, and the meshes that the page
+// draws.
 #pragma once
 
 #include <string>
@@ -8,10 +9,10 @@
 
 namespace proxarm::command_line {
 
-// Throws SetupError if a file is missing.
+// Reads the page's own files and three.js. Throws SetupError if a file is missing.
 view::Assets page_files();
 
-// Returns a mesh by its path in Stage::describe(); null if there is none.
+// Returns the mesh with this path in Stage::describe(); null if there is none.
 view::AssetPtr mesh_file(const view::Stage& stage, const std::string& path);
 
 }  // namespace proxarm::command_line

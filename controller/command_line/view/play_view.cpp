@@ -60,7 +60,7 @@ class PlayView {
 
   [[nodiscard]] std::string url() const { return server_.url(); }
 
-  // Returns the cycle that is due at this time, or the last one before.
+  // Returns the index of the last cycle that begins at this time or earlier.
   [[nodiscard]] std::size_t index_at(double time_s) const {
     std::size_t low = 0, high = session_.size() - 1;
     while (low < high) {
@@ -91,7 +91,8 @@ class PlayView {
     show(socket, session_.opening());
   }
 
-  // The margins to instability at the passed places, from the session's summary; empty for a black box.
+  // Returns the margins to instability at the places that the session passed, from its summary. Returns an empty list
+  // for a black box.
   static json margins_of(const fs::path& folder) {
     json margins = json::array();
     std::ifstream in(folder / "summary.json");
@@ -168,7 +169,7 @@ class PlayView {
 
 namespace {
 
-// "a.png", or for several pictures "a-01.png" and so on.
+// Returns the picture's file: "a.png", or "a-01.png" and so on for several pictures.
 fs::path picture_name(const ViewOptions& options, std::size_t index) {
   if (options.snapshots_s.size() == 1) return options.out;
   std::array<char, 24> number{};
@@ -177,7 +178,7 @@ fs::path picture_name(const ViewOptions& options, std::size_t index) {
   return name.replace_filename(options.out.stem().string() + number.data() + options.out.extension().string());
 }
 
-// Serves the page and draws it in a browser without a window.
+// Opens the view's page in a browser without a window, and takes the pictures.
 void take_pictures(const PlayView& shown, const ViewOptions& options) {
   HeadlessBrowser browser(options.size, options.dark);
   browser.open(shown.url());

@@ -1,10 +1,10 @@
-// `proxarm view DIR`: plays a recorded session or a black box until Ctrl-C.
+// Runs `proxarm view DIR`: plays a recorded session or a black box until Ctrl-C.
 //
-// Every page has its own place in the record, and requests what it shows:
+// Each page has its own time in the record, and requests the cycles that it shows. The requests, each with its answer:
 //   {"at": INDEX}             the moment of that cycle
 //   {"frames": INDEX}         {"frames": {"at": INDEX, "list": [{bus, id, bytes, from, words}, …]}}
-//   {"spectrum": INDEX}       {"spectrum": {"at": INDEX, …}}: the handle's vibration of the second before
-//   (vibration.hpp)
+//   {"spectrum": INDEX}       {"spectrum": {"at": INDEX, …}}, the handle's vibration in the second before that cycle
+//                             (vibration.hpp)
 //   {"window": [FROM, TO]}    a history of at most 800 rows
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace proxarm::command_line {
 
-// Returns the exit status; throws SetupError.
+// Runs the view and returns the exit status. Throws SetupError.
 int play_view(const ViewOptions& options);
 
 }  // namespace proxarm::command_line

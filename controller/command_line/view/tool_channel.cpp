@@ -24,10 +24,10 @@ struct Parameter {
 };
 constexpr std::array<Parameter, 3> parameters{{{"mass", "kg"}, {"damping", "Ns/m"}, {"spring", "N/m"}}};
 
-// Channels are numbered from 1, in the order of the topics.
+// Returns the number of a topic's channel. Channels are numbered from 1 in the order of the topics.
 std::uint32_t channel_of(Topic topic) { return static_cast<std::uint32_t>(topic) + 1; }
 
-// Topics that need a controller: a simulated arm alone doesn't have them.
+// Returns whether a topic needs a controller. A simulated arm without a controller doesn't have such topics.
 bool is_of_controller(Topic topic) {
   return topic == Topic::proxy || topic == Topic::contact || topic == Topic::session || topic == Topic::contacts ||
          topic == Topic::contact_arrows;
@@ -118,7 +118,8 @@ void ToolChannel::received(const SocketPtr& socket, std::string_view message, bo
   if (!said.is_object() || !said.contains("op") || !said["op"].is_string() || !obey(*client, said)) socket->drop();
 }
 
-// Returns false if the message isn't of the protocol or uses a capability that this server doesn't offer.
+// Does what a client's message says. Returns false if the message isn't of the protocol, or uses a capability that this
+// server doesn't offer.
 bool ToolChannel::obey(Client& client, const json& said) {
   const auto op = said["op"].get<std::string>();
   const auto list = [&](const char* name) {
@@ -205,7 +206,8 @@ void ToolChannel::set_parameter(const SocketPtr& socket, const std::string& name
                  const auto client = std::find_if(clients_.begin(), clients_.end(),
                                                   [&](const Client& c) { return c.socket == socket; });
                  if (client == clients_.end()) return;
-                 // An accepted value takes effect in one of the next cycles.
+                 // `settings_` doesn't have an accepted value yet, as the value takes effect in one of the next cycles.
+                 // So the accepted value itself is sent.
                  const bool taken = answer.compare(0, 4, "ok: ") == 0;
                  if (!taken) warn(*socket, answer);
                  if (!id.empty()) send_values(*client, {{name, taken ? value : value_of(name)}}, id);
@@ -228,13 +230,13 @@ void ToolChannel::show(const view::Moment& given) {
   }
   if (clients_.empty()) return;
   tell_changes();
-  // Tools expect the machine's time.
+  // The tools expect the machine's time instead of the session's.
   view::Moment moment = given;
   moment.record.time_ns += clock_ns_;
   stage_.place(moment.record, moment.rendered_s, links_, objects_);
   std::map<Topic, std::string> texts;
   for (Client& client : clients_) {
-    if (!client.socket->idle()) continue;  // it gets a later moment
+    if (!client.socket->idle()) continue;  // a busy client gets a later moment
     for (const auto& [subscription, topic] : client.subscriptions) {
       if (topic == Topic::scene) {
         if (client.has_scene && same(client.drawn, objects_)) continue;

@@ -1,10 +1,10 @@
-// Speaks the WebSocket protocol of Foxglove and Lichtblick under both of its names: foxglove.websocket.v1 and, since
-// its renaming, foxglove.sdk.v1.
+// Speaks the WebSocket protocol of the tools Foxglove and Lichtblick. The protocol's old name, foxglove.websocket.v1,
+// and its new one, foxglove.sdk.v1, are both accepted.
 //
-// Text messages are JSON with "op": to a new client serverInfo and advertise; from the client subscribe, unsubscribe,
-// getParameters, setParameters and (un)subscribeParameterUpdates. Binary messages are 01h, the subscription's number
-// (u32), the time (u64, ns), and the text. The parameters are mass, damping and spring; setting one sends it to the
-// session's control socket.
+// Text messages are JSON with the key "op". A new client gets serverInfo and advertise. A client may send subscribe,
+// unsubscribe, getParameters, setParameters, subscribeParameterUpdates and unsubscribeParameterUpdates. A binary
+// message consists of the byte 01h, the subscription's number (u32), the time (u64, ns), and a text. The parameters are
+// mass, damping and spring. A value that a client sets goes to the session's control socket.
 #pragma once
 
 #include <array>
@@ -31,15 +31,16 @@ class ToolChannel final : public view::Channel {
   void closed(const view::SocketPtr& socket) override;
   [[nodiscard]] std::string choose(const std::vector<std::string>& offered) const override;
 
-  // Sends to all clients that have subscribed and have taken the previous messages.
+  // Sends the moment's topics to the clients that have subscribed to them. A client that hasn't yet taken its previous
+  // messages is left out.
   void show(const view::Moment& moment);
 
  private:
   struct Client {
     view::SocketPtr socket;
     std::map<std::uint32_t, view::Topic> subscriptions;
-    std::set<std::string> watched;    // parameters whose changes the client gets
-    std::vector<models::Pose> drawn;  // the objects' poses in the last scene sent
+    std::set<std::string> watched;    // names of the parameters whose changes the client gets
+    std::vector<models::Pose> drawn;  // the objects' poses in the scene that was last sent to the client
     bool has_scene = false;
   };
   bool obey(Client& client, const nlohmann::json& said);
@@ -55,9 +56,9 @@ class ToolChannel final : public view::Channel {
   const view::PresentSettings& settings_;
   ControlLine& control_;
   view::SessionMessages messages_;
-  std::string session_id_;  // differs for each session, so that tools recognize a new one
+  std::string session_id_;  // differs for each session, so that tools recognize a new session
   std::vector<Client> clients_;
-  std::array<double, 3> told_{};  // parameter values last sent to watching clients
+  std::array<double, 3> told_{};  // parameter values that were last sent to watching clients
   std::int64_t clock_ns_ = 0;     // the machine's time minus the session's
   std::vector<models::Pose> links_, objects_;
 };

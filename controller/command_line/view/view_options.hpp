@@ -1,4 +1,4 @@
-// The options of `proxarm view`.
+// Declares the options of `proxarm view`.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@
 namespace proxarm::command_line {
 
 struct ViewOptions {
-  std::filesystem::path folder;  // of a record or a black box
+  std::filesystem::path folder;  // folder of a record or a black box
   std::uint16_t port = 0;        // 0: any free port
 
-  // Pictures at these times of the record (s), instead of serving the page.
+  // Times of the record (s) at which pictures are taken; if any, the page isn't served to a user.
   std::vector<double> snapshots_s;
-  std::filesystem::path out;  // several pictures get a number before the dot
+  std::filesystem::path out;  // the picture's file; several pictures get a number before the dot
   PictureSize size;
   bool dark = false;
   std::string look = "overview";

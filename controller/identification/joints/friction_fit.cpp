@@ -14,11 +14,12 @@ namespace {
 using models::JointVector;
 using Complex = std::complex<double>;
 
-// Unknowns: J; F and b of the slow motion; F and b of the fast motion; the torque's delay.
+// Index of each unknown: J; F and b of the slow motion; F and b of the fast motion; delay of the torque; lag of the
+// friction in the fast motion.
 constexpr int of_rotor = 0, of_slow = 1, of_fast = 3, of_delay = 5, of_lag = 6, unknowns = 7;
 constexpr double slow_highest_Hz = 20.0;
-constexpr int repeats = 12;  // each reduces the delay's error to a fraction
-// A motor below this share of its top speed counts as reversing: its friction may have any value.
+constexpr int repeats = 12;  // number of solutions; each one reduces the delay's error to a fraction
+// A motor that is slower than this share of its top speed counts as reversing. Its friction may then have any value.
 constexpr double turning_share = 0.01;
 
 using Row = Eigen::Matrix<Complex, unknowns, 1>;
@@ -37,7 +38,7 @@ std::vector<int> up_to(int last) {
   return lines;
 }
 
-// sgn(θ̇) over a cycle; the motor may stand while it reverses.
+// Returns sgn(θ̇) in each cycle of a period. The motor may stand while it reverses, so the sign changes gradually.
 Eigen::VectorXd signs_of_speed(const Eigen::VectorXd& motor_rad, double cycle_s, double encoder_step_rad) {
   const Eigen::Index rows = motor_rad.size();
   Eigen::VectorXd speed(rows);
@@ -48,7 +49,7 @@ Eigen::VectorXd signs_of_speed(const Eigen::VectorXd& motor_rad, double cycle_s,
   return (speed / turns_round).cwiseMax(-1.0).cwiseMin(1.0);
 }
 
-// Gravity's torque while the arm swings slowly; links are at the motors' angles except for the gears' twist.
+// Returns gravity's torque while the arm swings slowly. The links then follow the motors, apart from the gears' twist.
 Eigen::VectorXd gravity_torques(const models::Arm& arm, const Eigen::MatrixXd& motor_rad, int joint) {
   Eigen::VectorXd torque(motor_rad.rows());
   for (Eigen::Index n = 0; n < motor_rad.rows(); ++n) {
@@ -79,7 +80,7 @@ class Lines {
     more.col(0) = signs_of_speed(motor_rad.col(joint), record.cycle_s, inputs_.encoder_step_rad);
     more.col(1) = record.motion.fast ? Eigen::VectorXd::Zero(rows) : gravity_torques(arm_, motor_rad, joint);
     const Eigen::MatrixXcd extra = lines_of(more, rows, h);
-    // Rounding to steps adds the variance step²/12, spread over all lines of a period.
+    // Rounding to steps has the variance step²/12, spread over all lines of a period.
     const double rounding = inputs_.torque_step_Nm * inputs_.torque_step_Nm / 12.0 * 2.0 / rows;
     for (Eigen::Index k = 0; k < motors.mean.rows(); ++k) {
       const double omega = 2.0 * std::numbers::pi * record.base_Hz() * h[static_cast<std::size_t>(k)];
@@ -114,8 +115,8 @@ class Lines {
   std::vector<Line> lines_;
 };
 
-// A complex row is two real ones. Each line's residual gives its weight in the covariance (White, "A
-// heteroskedasticity-consistent covariance matrix estimator", 1980).
+// The solution of least squares in which each complex row counts as two real rows. In the covariance, each line is
+// weighted by its residual (White, "A heteroskedasticity-consistent covariance matrix estimator", 1980).
 struct Solution {
   Unknowns x = Unknowns::Zero();
   Square covariance = Square::Zero();

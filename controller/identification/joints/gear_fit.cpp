@@ -14,12 +14,14 @@ namespace {
 using Vector = Eigen::VectorXd;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr double loosely = 1.5, delay_deviation_s = 2e-3;  // the first for ln k and ln d
+// Standard deviation of the expectations: `loosely` for ln k and ln d, delay_deviation_s for δ.
+constexpr double loosely = 1.5, delay_deviation_s = 2e-3;
 constexpr int sweeps = 3, places = 33, damping_places = 9, most_steps = 60;
-// The model's residuals are correlated over this many neighbouring lines, which count as one.
+// The model's residuals are correlated over this many neighbouring lines, so these lines count as one.
 constexpr double alike = 4.0;
-// A gear is identifiable if no other gear explains the lines nearly as well. Other gears differ by more than three
-// deviations and by more than this.
+// A gear is identifiable if no other gear explains the lines nearly as well: the cost of other gears must be higher by
+// `surely`. A gear counts as another one if ln k differs by more than three standard deviations and by more than
+// least_apart.
 constexpr double surely = 30.0, least_apart = 0.1;
 const double searched = std::log(3.0);
 
@@ -44,7 +46,7 @@ class Problem {
     const std::complex<double> sensor = std::exp(p[2 * joints_ + 1] - i * line.omega * p[2 * joints_]) * low_pass;
     return sensor * response_.reading(line.omega, response_.links(gears(p), line.omega, line.motors));
   }
-  // Differences in standard deviations: twelve for each line, then those of the unknowns' expectations.
+  // Returns the differences in standard deviations: twelve for each line, then one for the expectation of each unknown.
   [[nodiscard]] Vector differences(const Vector& p) const {
     Vector r(12 * static_cast<Eigen::Index>(lines_.size()) + p.size());
     Eigen::Index at = 0;
@@ -70,7 +72,7 @@ class Problem {
     }
     return J;
   }
-  // A robust cost of the differences: lines near a misplaced mode don't outvote all others.
+  // Returns a robust cost of the differences, so that lines near a misplaced mode don't outvote all other lines.
   [[nodiscard]] double rough_cost(const Vector& p) const { return differences(p).array().square().log1p().sum(); }
   void search(Vector& p, Eigen::Index unknown, int count) const {
     const double centre = p[unknown];
@@ -84,7 +86,8 @@ class Problem {
     }
     p[unknown] = at;
   }
-  // The smallest cost with a clearly different gear, all else as in p: a rigid one, or one within reach of the search.
+  // Returns the smallest cost with a clearly different gear at this joint and all other unknowns as in p. The different
+  // gear is rigid, or within the range of the search.
   [[nodiscard]] double cost_of_others(const Vector& p, Eigen::Index joint, double half) const {
     constexpr double rigid = 4.0;
     Vector other = p;
@@ -145,7 +148,7 @@ std::vector<GearLine> gear_lines(const std::vector<MotionRecord>& fast, double l
     for (Eigen::Index k = 0; k < motors.mean.rows(); ++k) {
       GearLine line{2.0 * std::numbers::pi * record.base_Hz() * h[static_cast<std::size_t>(k)],
                     motors.mean.row(k).transpose(), sensor.mean.row(k).transpose(), Vector6::Zero()};
-      // This share of a line's size counts in both of its parts.
+      // This share of a line's size is added to the deviations of both parts.
       const double force = line_share * line.reading.head<3>().norm(),
                    torque = line_share * line.reading.tail<3>().norm();
       line.deviation = sensor.variance.row(k).transpose().cwiseSqrt();

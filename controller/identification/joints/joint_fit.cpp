@@ -17,14 +17,15 @@ using description::rounded_text;
 using models::JointVector;
 using models::Vec3;
 
-// A value whose half interval exceeds this share isn't identifiable.
+// A value isn't identifiable if half of its interval exceeds this share of the value.
 constexpr double most_half_share = 0.5;
 // If the arm's model leaves more than this share of the readings unexplained, something else moves the handle.
 constexpr double most_left_over = 0.25;
 constexpr double most_stale = 0.01;
-// In slow motions, what may remain without a hand: share of the tool's weight and inertia, share of the zero's drift.
+// Forces in slow motions that may remain unexplained without a hand: share of the tool's weight and inertia, share of
+// the zero's drift, number of the noise's standard deviations.
 constexpr double share_left = 0.1, drift_left = 0.03, deviations_left = 5.0;
-// Start of the search for a cell without gear stiffness or damping.
+// Start of the search if the cell has no gear stiffness or damping.
 constexpr double first_mode_Hz = 40.0, first_damping_ratio = 0.03;
 
 Gears gears_of(const description::Cell& cell, const LinkResponse& response) {
@@ -120,7 +121,7 @@ class JointsProblem {
     return e;
   }
 
-  // An error of the links that S doesn't model changes k by about as much as their inertia.
+  // An error of the links that S doesn't model changes k by about the same share as it changes the links' inertia.
   [[nodiscard]] Estimate gear(double value, double deviation_of_log) const {
     return judged(value, deviations_of_95 * value * std::hypot(deviation_of_log, allowed_.link_inertia),
                   "the tool hardly swings by it up to 40 Hz: its link is too light or its gear too stiff, or the "
@@ -149,7 +150,8 @@ class JointsProblem {
     e.viscous_Nms_per_rad = judged(value[2], deviations_of_95 * deviation[2], hidden_by);
   }
 
-  // Includes the errors of links, torque scale and the joint's own gear.
+  // Returns the friction. The deviations include the errors of the links, of the torque's scale and of the joint's own
+  // gear.
   [[nodiscard]] FrictionFit friction(int joint, const description::DriveDescription& drive) const {
     FrictionInputs inputs{.slow = record(joint, false),
                           .fast = record(joint, true),
@@ -178,13 +180,14 @@ class JointsProblem {
     return fit;
   }
 
-  // The possible difference between the torque at the setpoints and the mean, as a share of J θ̈.
+  // Returns the possible difference between the torque at the setpoints and the mean torque, as a share of J θ̈.
   [[nodiscard]] double between_setpoints(const description::DriveDescription& drive) const {
     const double stiff = 2.0 * std::numbers::pi * drive.position_bandwidth_Hz * records_.front().cycle_s;
     return stiff * stiff / 12.0;
   }
 
-  // In slow motions the sensor reads only the tool's weight and inertia; changes from motion to motion are drift.
+  // Returns why the records are doubtful; empty if they aren't. In slow motions, the sensor reads only the tool's
+  // weight and inertia; changes from motion to motion are drift.
   [[nodiscard]] std::string touched() const {
     const Vec3 first_S = records_.front().reading_S.leftCols<3>().colwise().mean();
     for (const MotionRecord& record : records_) {
@@ -208,7 +211,7 @@ class JointsProblem {
     return "";
   }
 
-  // The residual of the slow motion's line; 0: explained.
+  // Returns the size of the slow motion's line that isn't explained; 0 if the model explains the line.
   [[nodiscard]] double unexplained_N(const MotionRecord& record) const {
     const Spectrum motors = spectrum(record.motor_rad, record.rows_per_period, {1});
     const Spectrum sensor = spectrum(record.reading_S, record.rows_per_period, {1});

@@ -21,7 +21,7 @@ constexpr double slow_tool_m_per_s = 0.06, line_tool_m_per_s2 = 0.25;
 constexpr double most_rad = 0.1, least_rad = 1e-4;
 constexpr double share_of_speed = 0.2, share_of_torque = 0.2, share_of_acceleration = 0.03, share_of_room = 0.5;
 constexpr int first_line = 6, line_step = 3, cycles_per_line = 12;
-// A shorter lever hardly moves the tool.
+// Least lever arm that is assumed between a joint and the tool; a shorter one hardly moves the tool.
 constexpr double least_lever_m = 1e-3;
 
 int rows_of(double cycle_s) { return static_cast<int>(std::lround(base_period_s / cycle_s)); }
@@ -44,7 +44,7 @@ double minimum_jerk(double s) {
   return x * x * x * (10.0 + x * (-15.0 + x * 6.0));
 }
 
-// The motion without its ramps.
+// Returns the motion without its ramps.
 double wave(const JointMotion& motion, double time_s, double cycle_s) {
   const double base_rad_per_s = 2.0 * pi / (rows_of(cycle_s) * cycle_s);
   if (!motion.fast) return motion.amplitude * std::sin(base_rad_per_s * time_s);
@@ -64,7 +64,7 @@ double most_offset(const JointMotion& motion, double cycle_s) {
   return most;
 }
 
-// The smallest of the bounds in the header.
+// Returns the smallest amplitude of the bounds in the header.
 double amplitude_of(const description::Cell& cell, const models::ToolKinematics& at, int joint, bool fast,
                     double cycle_s) {
   const description::DriveDescription& drive = cell.drives[static_cast<std::size_t>(joint)];
@@ -74,7 +74,7 @@ double amplitude_of(const description::Cell& cell, const models::ToolKinematics&
   const int rows = rows_of(cycle_s);
   if (fast) {
     const double lines = line_count(rows, cycle_s);
-    const double peak = std::sqrt(2.0 * lines);  // of the sum of lines, in amplitudes of one line
+    const double peak = std::sqrt(2.0 * lines);  // peak of the sum of lines, in amplitudes of one line
     return std::min(
         {share_of_acceleration * drive.max_acceleration_rad_per_s2, line_tool_m_per_s2 / lever_m, by_torque / peak});
   }
@@ -83,7 +83,7 @@ double amplitude_of(const description::Cell& cell, const models::ToolKinematics&
                    by_torque / (omega * omega)});
 }
 
-// Distance from the joint's angle to the nearer end of its range.
+// Returns the distance from the joint's angle to the nearer end of the joint's range.
 double room_rad(const description::Cell& cell, const models::Arm& arm, const JointVector& motor_rad, int joint) {
   const description::DriveDescription& drive = cell.drives[static_cast<std::size_t>(joint)];
   const double low = std::max(drive.range_rad[0], arm.lower_rad()[joint]);

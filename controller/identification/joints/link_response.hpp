@@ -1,14 +1,15 @@
-// Small motions of links and sensor about a pose, as a response to the motors, line by line of a spectrum.
+// Computes small motions of links and sensor about a pose, as a response to motions of the motors, for each line of a
+// spectrum.
 //
-// With θ the motors' angles and φ the links' (rad at the joint; for linear joints m), at a frequency ω (rad/s):
+// θ are the motors' angles and φ the links' angles (rad at the joint; for linear joints m), at a frequency ω (rad/s):
 //   (K + iωD − ω² S M S + G) φ = (K + iωD) θ                                                  (1)
 //   K, D: diagonal, Nm/rad and Nms/rad;  M: links and tool without rotors, kg m²;  G = ∂τ_g/∂φ, Nm/rad;
-//   S: diagonal, about 1: square root of the links' true inertia over the URDF's
+//   S: diagonal, about 1: square root of the ratio of the links' true inertia to the URDF's
 // The gears' torques drive the links:
 //   τ_gear = (G − ω²M) φ                                                                      (2)
-// The tool (mass m, centre of mass C, inertia I about it) behind the sensor reads, in S,
+// The tool behind the sensor has the mass m, the centre of mass C and the inertia I about C. The sensor reads, in S,
 //   F = m R_SW (ω² J_C φ − (J_ω φ) × g),   τ = c × F + ω² I R_SW J_ω φ                        (3)
-// with J_C, J_ω the Jacobians of C and of the rotation, in W.
+// J_C and J_ω are the Jacobians of C and of the rotation, in W.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +30,7 @@ struct Gears {
 
 class LinkResponse {
  public:
-  // The links' inertias are the cell's times `inertia_share`.
+  // The links' inertias are the cell's inertias times `inertia_share`.
   LinkResponse(const description::Cell& cell, const models::Arm& arm, const models::JointVector& motor_rad,
                double inertia_share = 1.0);
 
@@ -40,7 +41,7 @@ class LinkResponse {
 
  private:
   Eigen::MatrixXd mass_, gravity_;
-  Eigen::Matrix<double, 6, Eigen::Dynamic> per_acceleration_, per_angle_;  // of the reading: per −ω² φ and per φ
+  Eigen::Matrix<double, 6, Eigen::Dynamic> per_acceleration_, per_angle_;  // parts of the reading: per −ω² φ, and per φ
 };
 
 }  // namespace proxarm::identification

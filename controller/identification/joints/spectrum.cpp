@@ -10,7 +10,7 @@ namespace {
 
 constexpr int neighbours = 5;
 
-// X_h = 2/N Σ x_n e^(−i 2π h n/N)
+// Returns the matrix E of X = E x: X_h = 2/N Σ x_n e^(−i 2π h n/N).
 Eigen::MatrixXcd projection(int rows, const std::vector<int>& lines) {
   Eigen::MatrixXcd E(static_cast<Eigen::Index>(lines.size()), rows);
   for (std::size_t k = 0; k < lines.size(); ++k) {
@@ -46,7 +46,7 @@ Spectrum spectrum(const Eigen::MatrixXd& record, int rows, const std::vector<int
   }
   Eigen::MatrixXd raw = Eigen::MatrixXd::Zero(E.rows(), record.cols());
   for (const Eigen::MatrixXcd& lines_of : each) raw += (lines_of - s.mean).cwiseAbs2();
-  // Half of |X − mean|² is of the real part; n − 1 of n periods are independent of their mean.
+  // Half of |X − mean|² belongs to the real part. Of n periods, n − 1 are independent of their mean.
   s.variance = smoothed(raw / (2.0 * (periods - 1) * periods));
   return s;
 }

@@ -25,7 +25,8 @@ std::size_t style_of(const Curve& curve) {
   return static_cast<std::size_t>(curve.style) % controller::series_styles().size() + 1;
 }
 
-// Ticks at the given places, else at gnuplot's; over many decades at every other decade.
+// Sets ticks at the given places. If there are none, sets them at every other decade for an axis of many decades, else
+// where gnuplot puts them.
 void ticks(std::ostream& gp, char axis, const std::vector<double>& places, bool many_decades) {
   if (!places.empty()) return set_ticks(gp, axis, places);
   gp << "set " << axis << "tics " << (many_decades ? "100\n" : "auto\n");
@@ -44,7 +45,7 @@ void set_axis(std::ostream& gp, char axis, double low, double high, bool log, co
   ticks(gp, axis, places, log && low > 0.0 && high / low > 1e6);
 }
 
-constexpr std::size_t name_width = 9;  // letters
+constexpr std::size_t name_width = 9;  // in letters
 
 void name_places(std::ostream& gp, const std::vector<std::string>& names) {
   gp << "set xtics (";
@@ -107,7 +108,7 @@ void draw_note(std::ostream& gp, const Note& note, int label) {
      << rgb("ink") << " boxed\n";
 }
 
-// Writes one point per line; a y that isn't finite leaves a gap.
+// Writes one point per line. A point whose y isn't finite leaves a gap in the curve.
 void write_points(std::ostream& data, const Curve& curve) {
   for (std::size_t k = 0; k < curve.x.size(); ++k) {
     if (std::isfinite(curve.y[k])) {
@@ -119,14 +120,14 @@ void write_points(std::ostream& data, const Curve& curve) {
   data << "\n\n";
 }
 
-// For example "with lines ls 2", for gnuplot.
+// Returns how gnuplot is to draw a curve, for example "with lines ls 2".
 std::string look_of(const Curve& curve, double mark_size) {
   return std::string("with ") + (curve.line ? (curve.marks ? "linespoints" : "lines") : "points") + " ls " +
          std::to_string(style_of(curve)) + (curve.marks ? " ps " + std::to_string(mark_size) : "");
 }
 
-// gnuplot's plot entries of a panel: its curves, and rings around its notes. Appends their points to `data`, one block
-// each.
+// Returns gnuplot's plot entries for a panel's curves, and for the rings around the panel's notes. Appends the points
+// of each entry to `data` as a block.
 std::vector<std::string> plots_of(const Panel& panel, std::ostream& data, std::size_t& block) {
   std::vector<std::string> plots;
   const auto add = [&](const Curve& curve, const std::string& look) {
@@ -145,7 +146,8 @@ std::vector<std::string> plots_of(const Panel& panel, std::ostream& data, std::s
   return plots;
 }
 
-// The key's entries for all panels' curves, each name once. gnuplot draws them with the first panel, without data.
+// Returns gnuplot's plot entries for the key, one for each name of a curve in any panel. gnuplot draws these entries
+// with the first panel, without data.
 std::vector<std::string> key_entries(const Chart& chart, std::size_t& longest) {
   std::vector<std::string> entries;
   std::set<std::string> named;
@@ -197,7 +199,7 @@ Layout layout_of(const Chart& chart, double top, std::size_t entries, std::size_
     const std::size_t columns = wide ? 1 : static_cast<std::size_t>(chart.columns);
     const std::size_t end = std::min(i + columns, chart.panels.size());
     double above = 0.0, below = 0.0, right = 0.0;
-    if (chart.columns == 1) {  // frames below each other have the same width
+    if (chart.columns == 1) {  // panels below each other get frames of the same width
       for (const Panel& panel : chart.panels) right = std::max(right, room_right(panel));
     }
     for (std::size_t k = i; k < end; ++k) {
@@ -225,7 +227,7 @@ Layout layout_of(const Chart& chart, double top, std::size_t entries, std::size_
   return layout;
 }
 
-// Sets everything of a panel except its curves.
+// Sets everything of a panel except the curves.
 void set_panel(std::ostream& gp, const Panel& panel) {
   set_axis(gp, 'x', panel.x_low, panel.x_high, panel.log_x, panel.x_ticks);
   set_axis(gp, 'y', panel.y_low, panel.y_high, panel.log_y, panel.y_ticks);

@@ -16,7 +16,7 @@ namespace {
 constexpr int title_size = 21, subtitle_size = 17, text_size = 17;
 constexpr double title_line = 27.0, subtitle_line = 23.0;
 
-// Escapes the characters that gnuplot's enhanced text would interpret.
+// Returns the text with the characters escaped that gnuplot's enhanced text would interpret.
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
@@ -26,7 +26,7 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-// The number of letters of this size that fit into the width.
+// Returns how many letters of this size fit into the width.
 std::size_t fitting(int width, int size) { return static_cast<std::size_t>(1.7 * width / size); }
 
 }  // namespace
@@ -59,7 +59,8 @@ std::vector<std::string> wrapped(const std::string& text, std::size_t width) {
   };
   for (std::string word; words >> word;) {
     bound += (bound.empty() ? "" : " ") + word;
-    if (std::isdigit(static_cast<unsigned char>(word.back())) == 0) put();  // a number stays with its unit
+    // A number stays with the next word, its unit.
+    if (std::isdigit(static_cast<unsigned char>(word.back())) == 0) put();
   }
   put();
   return lines;

@@ -15,7 +15,8 @@ namespace {
 constexpr double map_left = 92.0, map_right = 14.0, map_above = 56.0, map_between = 44.0, map_below = 68.0,
                  scale_width = 96.0, note_height = 30.0;
 
-// `steps` colours from the palette's map, from its first to its last one, each for one part of the scale.
+// Returns gnuplot's palette of `steps` colours, each for one part of the scale. The colours are spaced evenly between
+// the first and the last of map_colours().
 std::string palette_steps(int steps) {
   const auto colours = controller::map_colours();
   std::string text;
@@ -31,7 +32,8 @@ std::string palette_steps(int steps) {
   return text;
 }
 
-// Where a grid cell ends: halfway (logarithmically) to the next line, and as far beyond the last one.
+// Returns where the cell at grid line k ends: logarithmically halfway to the next line, and by the same ratio beyond
+// the last line. `side` is negative for the lower end.
 double edge(const std::vector<double>& grid, std::size_t k, double side) {
   const std::size_t last = grid.size() - 1;
   if (last == 0) return grid[0] * (side < 0.0 ? 0.9 : 1.1);
@@ -40,7 +42,7 @@ double edge(const std::vector<double>& grid, std::size_t k, double side) {
   return outer ? grid[k] * std::sqrt(grid[k] / grid[other]) : std::sqrt(grid[k] * grid[other]);
 }
 
-// One line per cell, for gnuplot's boxxyerror; for a map without cells, a line that isn't drawn.
+// Returns one line per cell, for gnuplot's boxxyerror. For a map without cells, returns a line that isn't drawn.
 std::string cells_of(const Map& map) {
   std::ostringstream cells;
   cells.precision(8);
@@ -56,8 +58,8 @@ std::string cells_of(const Map& map) {
   return cells.str().empty() ? "1 1 1 1 1 1 nan\n" : cells.str();
 }
 
-// Sets everything of a map except its cells. `first`: it is the first in its row; `lowest`: it is the last in its
-// column.
+// Sets everything of a map except the cells. `first`: the map is the first in its row. `lowest`: the map is the last in
+// its column.
 void set_map(std::ostream& gp, const MapChart& chart, const Map& map, bool first, bool lowest) {
   for (const auto& [axis, grid] : {std::pair{'x', &map.x}, std::pair{'y', &map.y}}) {
     gp << "set logscale " << axis << "\nset " << axis << "range [" << edge(*grid, 0, -1.0) << ":"
@@ -95,7 +97,7 @@ Scale scale_of(const MapChart& chart) {
 
 namespace {
 
-// Colours of half a decade each, with ticks between them.
+// Sets the scale of colours. Each colour is for half a decade, and there are ticks between the colours.
 void set_scale(std::ostream& gp, const Scale& scale) {
   const auto halves = static_cast<int>(std::lround(2.0 * std::log10(scale.high / scale.low)));
   gp << "set palette defined (" << palette_steps(halves) << ")"
@@ -134,7 +136,7 @@ void place_scale(std::ostream& gp, const MapChart& chart, const Page& page, cons
      << page.screen_y(layout.top) - page.screen_y(layout.frames_end) << "\n";
 }
 
-// Draws the cells, and a white mark with a ring at each note.
+// Draws a map's cells, and a white mark with a ring at each note.
 void plot_map(std::ostream& gp, std::ostream& data, const Map& map, std::size_t& block) {
   data << cells_of(map) << "\n\n";
   gp << "plot 'data' index " << block++

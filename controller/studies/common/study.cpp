@@ -110,12 +110,12 @@ void parallel(std::size_t count, unsigned threads, const std::function<void(std:
   if (failure) std::rethrow_exception(failure);
 }
 
-// SplitMix64, Steele et al. 2014.
+// Source: SplitMix64, Steele et al. 2014.
 std::uint64_t job_seed(std::uint64_t seed, std::size_t job) {
   std::uint64_t z = seed * 0x9E3779B97F4A7C15u + static_cast<std::uint64_t>(job) + 0x632BE59BD9B4E019u;
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
   z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-  return (z ^ (z >> 31)) >> 11;  // 53 bits: exact in a CSV and in JSON
+  return (z ^ (z >> 31)) >> 11;  // 53 bits, which CSV and JSON hold exactly
 }
 
 std::string machine() {
@@ -207,7 +207,7 @@ Outcome merge_study(const std::function<const Study&(const std::string&)>& study
     }
     table.read_csv(fs::path(file).replace_extension(".csv"));
   }
-  // Each job may occur once; all rows of a job come from one part.
+  // Each job may occur once. All rows of a job are from one part, so they are next to each other.
   std::set<std::size_t> seen;
   std::size_t previous = static_cast<std::size_t>(-1);
   for (std::size_t row = 0; row < table.rows(); ++row) {

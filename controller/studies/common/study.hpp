@@ -1,11 +1,11 @@
-// The frame of all studies: jobs on all cores, a progress bar, parts of a sweep (shards) and their merging, and the
+// Runs studies: runs jobs on all cores with a progress bar, runs and merges parts of a study (shards), and writes the
 // files
 //   NAME.csv   every run
 //   NAME.json  the headline figures, their meaning (`keys`), and their origin: seed, machine, command, version
 //   *.svg      plots
 //
-// A study consists of independent jobs. Headline and plots use the table alone, so merged parts give the same files as
-// a single run.
+// A study consists of independent jobs. Headline and plots depend on the table alone, so merged parts give the same
+// files as a single run.
 #pragma once
 
 #include <cstdint>
@@ -24,11 +24,11 @@ namespace proxarm::studies {
 
 struct Options {
   bool quick = false;            // fewer and coarser runs, for a first look and for continuous integration
-  std::uint64_t seed = 1;        // of all random numbers
-  std::optional<double> runs{};  // number of runs, if the study has one; unset: its own number
+  std::uint64_t seed = 1;        // seed of all random numbers
+  std::optional<double> runs{};  // number of runs, for studies that have one; unset: the study's own number
 };
 
-// The I-th of N parts, counted from 1: jobs I−1, I−1+N, …
+// The I-th of N parts of a study, counted from 1. It has the jobs I−1, I−1+N, …
 struct Shard {
   std::size_t index = 1, count = 1;
   // Parses "2/8". Throws description::SetupError.
@@ -48,14 +48,14 @@ class Study {
   [[nodiscard]] virtual std::size_t jobs(const Options& options) const = 0;
   // Runs one job and returns at least one row. Several threads call it at once.
   [[nodiscard]] virtual std::vector<Row> run(std::size_t job, const Options& options) const = 0;
-  // The headline of the whole table, with {"keys": {name: meaning}}.
+  // Returns the headline figures of the whole table, and their meanings as {"keys": {name: meaning}}.
   [[nodiscard]] virtual nlohmann::json headline(const Table& table, const Options& options) const = 0;
-  // Writes plots into `out`; returns warnings.
+  // Writes the plots into the folder `out`. Returns warnings.
   [[nodiscard]] virtual std::vector<std::string> plot(const Table& table, const Options& options,
                                                       const std::filesystem::path& out) const = 0;
-  // A few lines for people.
+  // Returns a few lines for people.
   [[nodiscard]] virtual std::string text(const nlohmann::json& headline) const = 0;
-  // True if the study found a violation: exit status 1.
+  // Returns whether the study found a violation. If so, the exit status is 1.
   [[nodiscard]] virtual bool failed(const nlohmann::json& /*headline*/) const { return false; }
 };
 
@@ -66,7 +66,7 @@ struct Outcome {
 };
 
 // Runs the shard's jobs on `threads` threads (0: one per core), shows progress on a terminal, and writes the files. For
-// a part of the whole, these are a CSV and a JSON that names the part.
+// a part of a study, these files are a CSV, and a JSON that names the part.
 Outcome run_study(const Study& study, const Options& options, const Shard& shard, const std::filesystem::path& out,
                   const std::string& command, unsigned threads = 0);
 
@@ -78,10 +78,10 @@ Outcome merge_study(const std::function<const Study&(const std::string&)>& study
 // Calls work(i) for all i < count on `threads` threads (0: one per core). Rethrows an exception of a call.
 void parallel(std::size_t count, unsigned threads, const std::function<void(std::size_t)>& work);
 
-// The seed of a job, derived from the study's.
+// Returns the seed of a job, which is derived from the study's seed.
 std::uint64_t job_seed(std::uint64_t seed, std::size_t job);
 
-// "model name, N cores", as in /proc/cpuinfo.
+// Returns "model name, N cores", with the model's name from /proc/cpuinfo.
 std::string machine();
 
 }  // namespace proxarm::studies

@@ -24,15 +24,15 @@ using controller::AdmittanceProxy;
 using models::Vec3;
 using nlohmann::json;
 
-// The rate at which (26) changes the speed of a frictionless slide around a sphere, 1/s, and the predicted T f_n/(M R).
-// Speed is lost on the inside and gained on the outside.
+// Returns the rate at which (26) changes the speed of a frictionless slide around a sphere, 1/s, and the predicted rate
+// T f_n/(M R). On the inside of a sphere the slide loses speed; on the outside it gains speed.
 json energy_rate(bool inside) {
   constexpr double R = 0.1, M = 1.0, T = 1e-3, speed = 0.2, push = 5.0;
   std::vector<models::World::Entry> entries;
   entries.push_back({std::make_unique<models::Sphere>(models::PointCore{Vec3::Zero()}, R, 0.0, inside), 0, 0});
   models::World world(std::move(entries));
   AdmittanceProxy<3> proxy({.mass_kg = M, .period_s = T}, world);
-  const double toward = inside ? 1.0 : -1.0;  // sign of the push, onto the surface
+  const double toward = inside ? 1.0 : -1.0;  // sign of the push that presses the proxy onto the surface
   proxy.start({.q = R * Vec3::UnitX(),
                .v = speed * Vec3::UnitY(),
                .a = -speed * speed / R * Vec3::UnitX(),

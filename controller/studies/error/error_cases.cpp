@@ -23,7 +23,7 @@ constexpr double g_m_per_s2 = 9.80665;
 
 World free_space() { return std::make_unique<models::FreeSpace<3>>(); }
 
-// The 𝒢 of a single object without a world.
+// The 𝒢 of a single object.
 class OneObstacle final : public GeometricAlgorithm<3> {
  public:
   explicit OneObstacle(std::unique_ptr<models::Obstacle> obstacle) : obstacle_(std::move(obstacle)) {}
@@ -49,8 +49,8 @@ World inside_sphere(double radius_m) {
       std::make_unique<models::Sphere>(models::PointCore{Vec3::Zero()}, radius_m, 0.0, true));
 }
 
-// Jacobi's sn, cn, dn of modulus k by descending Landen transformations (Abramowitz and Stegun 16.4,
-// arithmetic-geometric mean).
+// Jacobi's elliptic functions sn, cn, dn of modulus k. Source: descending Landen transformations with the
+// arithmetic-geometric mean, Abramowitz and Stegun 16.4.
 struct Elliptic {
   double sn, cn, dn;
 };
@@ -88,11 +88,11 @@ ErrorCase free_sine() {
   c.force.sine = {5.0, 0.0, 2.0};
   c.force.omega_rad_per_s = 4.0 * std::numbers::pi;
   c.exact = [A = c.force.sine, w = c.force.omega_rad_per_s](double t) {
-    const Vec3 v0 = -A / w;  // so that it moves to and fro
+    const Vec3 v0 = -A / w;  // with this initial velocity the proxy moves to and fro
     return CaseState{v0 * t + A * ((w * t - std::sin(w * t)) / (w * w)), v0 + A * ((1.0 - std::cos(w * t)) / w),
                      Vec3::Zero()};
   };
-  // v0 makes the mean velocity 0: x = −A sin(ωt)/ω² + (A/ω + v0) t.
+  // v0 makes the mean velocity 0, because x = −A sin(ωt)/ω² + (A/ω + v0) t.
   c.world = free_space;
   return c;
 }
@@ -248,7 +248,8 @@ ErrorCase viscous() {
   return c;
 }
 
-// M ẍ + D_h ẋ + K_h (x − x_int) = 0 until it hits the wall: the closed-form matrix exponential of two states.
+// The exact motion obeys M ẍ + D_h ẋ + K_h (x − x_int) = 0 until the proxy hits the wall. Its solution is the matrix
+// exponential of two states in closed form.
 ErrorCase hand_wall() {
   ErrorCase c{.name = "hand_wall", .title = "a hand pushes against a wall", .mass_kg = 2.0, .duration_s = 0.4};
   static constexpr double K = 500.0, D = 20.0, x0 = 0.03, target = -0.02;

@@ -1,6 +1,6 @@
-// The error study's motions, whose exact solutions are known.
+// Defines the error study's motions, whose exact solutions are known.
 //
-// Units are m, kg, N, s. Each motion has its world twice: as 𝒢 for (26), and as surfaces for the penalty methods
+// Units: m, kg, N, s. Each motion has its world twice: as 𝒢 for (26), and as surfaces for the penalty methods
 // (penalty_world.hpp).
 #pragma once
 
@@ -33,7 +33,8 @@ struct CaseForce {
   }
 };
 
-// A plane (normal, point), or the inside of a sphere (radius > 0, centre at `point`).
+// A surface: a plane through `point` with `normal`, or, if radius_m > 0, the inside of a sphere with its centre at
+// `point`.
 struct CaseSurface {
   models::Vec3 point = models::Vec3::Zero(), normal = models::Vec3::UnitZ();
   double radius_m = 0.0;
@@ -41,7 +42,7 @@ struct CaseSurface {
 
 struct CaseState {
   models::Vec3 q = models::Vec3::Zero(), v = models::Vec3::Zero();
-  models::Vec3 f = models::Vec3::Zero();  // of the world on the proxy
+  models::Vec3 f = models::Vec3::Zero();  // force of the world on the proxy
 };
 
 struct ErrorCase {
@@ -51,10 +52,11 @@ struct ErrorCase {
   CaseForce force{};
   std::vector<CaseSurface> surfaces{};
   double friction = 0.0;
-  double medium_Ns_per_m = 0.0;  // where x > 0
+  double medium_Ns_per_m = 0.0;  // damping of a medium where x > 0
   bool starts_in_contact = false;
-  double stop_s = -1.0;  // when it comes to rest; negative: never
-  bool turns = false;    // the normal or the slide's direction turns, so (26) is of first order
+  double stop_s = -1.0;  // when the proxy comes to rest; negative: never
+  // Whether the normal or the direction of the slide turns, so that (26) is of first order.
+  bool turns = false;
   std::function<CaseState(double)> exact{};
   std::function<std::unique_ptr<models::GeometricAlgorithm<3>>()> world{};
 };

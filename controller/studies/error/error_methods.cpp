@@ -18,8 +18,8 @@ using models::Vec3;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Numbers of steps of a motion, from coarse to fine; one of them gives steps of 1 ms. With at most `instants` steps,
-// each step ends at an instant.
+// Returns the numbers of steps into which a motion is divided, from coarse to fine. One of them gives steps of 1 ms.
+// With at most `instants` steps, each step ends at an instant.
 std::vector<int> step_counts(const ErrorCase& which, bool quick) {
   std::vector<int> counts{4, 5, 6, 10, 12, 15, 20, 30, static_cast<int>(std::lround(which.duration_s / 1e-3))};
   for (const int per_instant : {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128}) {
@@ -30,16 +30,16 @@ std::vector<int> step_counts(const ErrorCase& which, bool quick) {
   return counts;
 }
 
-// Number of places within a step at which the motion starts.
+// Returns the number of phases, which are places within a step at which the motion starts.
 int phase_count(bool quick) { return quick ? 5 : 50; }
 
-// The velocity at the last sample: the slope of the cubic through the last four positions, from the mean velocities
-// between them. A parabola through three positions errs by T²v̈/3, which was most of order 2's error with a damped
-// hand.
+// Computes the velocity at the last sample from the mean velocities over the last three steps: the slope of the cubic
+// through the last four positions. The slope of a parabola through three positions errs by T²v̈/3. With a damped hand,
+// that was most of the error of order 2.
 class SampledVelocity {
  public:
   explicit SampledVelocity(const Vec3& mean) : v_1_(mean) {}
-  // `mean`: over the step just taken.
+  // Returns the velocity at the end of the step just taken. `mean` is the mean velocity over that step.
   Vec3 operator()(const Vec3& mean) noexcept {
     const Vec3 v = known_ ? Vec3((11.0 * mean - 7.0 * v_1_ + 2.0 * v_2_) / 6.0) : Vec3(1.5 * mean - 0.5 * v_1_);
     v_2_ = v_1_;
@@ -49,11 +49,11 @@ class SampledVelocity {
   }
 
  private:
-  Vec3 v_1_, v_2_ = Vec3::Zero();  // one step and two steps before
+  Vec3 v_1_, v_2_ = Vec3::Zero();  // mean velocities one step and two steps before
   bool known_ = false;             // whether v_2_ is set
 };
 
-// The proxy under study: its state at time t from t_0 on, and step() to the next sample.
+// The proxy under study. It starts with the exact state at time t_0, and step() goes to the next sample.
 class Ours {
  public:
   Ours(const ErrorCase& which, Method method, double T, double t_0)
@@ -173,7 +173,7 @@ Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps, double t_0
     if ((k + 1) % per_instant != 0) continue;
     const CaseState exact = which.exact(t);
     sum_q += (stepper.q() - exact.q).squaredNorm();
-    // In a step with an impact the velocity jumps, so it isn't compared.
+    // Near an impact the velocity jumps, so it isn't compared there.
     if (which.stop_s < 0.0 || std::abs(t - which.stop_s) > 2.0 * which.duration_s / instants) {
       sum_v += (stepper.v() - which.exact(stepper.v_label_s(t)).v).squaredNorm();
       ++counted_v;
@@ -194,11 +194,12 @@ double ns_per_step(auto& stepper, double T, int steps) {
   const auto begun = std::chrono::steady_clock::now();
   for (int k = 0; k < steps; ++k) stepper.step(k * T);
   const double ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begun).count();
-  // Never true, but keeps the compiler from removing the steps.
+  // isnan() is never true here; using q keeps the compiler from removing the steps.
   return std::isnan(stepper.q().x()) ? infinity : ns / steps;
 }
 
-// Short rounds that alternate between a step of (26) and one of the method, so that other load disturbs both.
+// Measures the time of a step in short rounds that alternate between steps of (26) and steps of the method, so that
+// other load on the machine disturbs both alike.
 template <typename Make>
 void time_rounds(const ErrorCase& which, Make make, int steps, MethodRun& run) {
   const double T = which.duration_s / steps;
@@ -214,7 +215,8 @@ void time_rounds(const ErrorCase& which, Make make, int steps, MethodRun& run) {
   run.of_reference = Spread::of(shares);
 }
 
-// A stiff wall that diverges at these steps may be stable at finer ones; then its time is measured there.
+// Measures the time of a step. With a stiff wall the method may diverge at this number of steps and be stable with
+// finer steps. Then the time is measured with the finer steps.
 template <typename Make>
 void time_steps(const ErrorCase& which, Make make, int steps, MethodRun& run) {
   for (const int finer : {1, 4, 16}) {
@@ -257,7 +259,7 @@ std::vector<MethodRun> runs(const ErrorCase& which, bool quick, Make make) {
 
 }  // namespace
 
-// The nearest of the values, so that the result is one of them; may be infinite.
+// Takes the value nearest to each percentile without interpolation, because values may be infinite.
 Spread Spread::of(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const auto at = [&](double share) {

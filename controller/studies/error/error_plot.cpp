@@ -25,8 +25,8 @@ constexpr std::array<const char*, method_count> method_titles{
 
 enum Look { look_order_1, look_order_2, look_rival, look_fixed = 7, look_1_ms = 6, look_luck = 4 };
 
-// The axis over which errors are drawn: the time of a run, with the error that nine of ten runs stay below, or the
-// timestep, with the median error.
+// The quantity over which errors are drawn. Over the run time, the drawn error is the one that nine of ten runs stay
+// below; over the timestep, it is the median error.
 enum class Over { run_time, timestep };
 
 double x_of(Over over, const Runs& runs, std::size_t i) {
@@ -37,8 +37,9 @@ double error_of(Over over, const Runs& runs, std::size_t i) {
   return over == Over::run_time ? runs.error[i].high : runs.error[i].median;
 }
 
-// Number of coarse runs that are exact by chance: a finer run errs by more than ten times rounding. Their steps happen
-// to end where all methods are exact, which says nothing about the method.
+// Returns the number of coarse runs that are exact by chance. A run counts as such if it is exact while a finer run
+// errs by more than ten times rounding. The steps of such a run happen to end where all methods are exact, which says
+// nothing about the method.
 std::size_t lucky_runs(const Runs& ours, Over over) {
   std::size_t lucky = 0;
   double worst_finer = 0.0;
@@ -58,7 +59,7 @@ void add_point(Curve& curve, double x, double error_m) {
 
 void add_ours(const Runs& ours, Method method, Over over, Panel& panel) {
   Curve curve{.name = method_titles[method], .style = method == order_1 ? look_order_1 : look_order_2, .marks = true};
-  if (method == order_2) curve.mark_size = 1.3;  // others may lie on it
+  if (method == order_2) curve.mark_size = 1.3;  // larger, because another curve may lie on this one
   Curve luck{.name = "exact by luck: finer steps err more", .style = look_luck, .marks = true, .line = false};
   const std::size_t lucky = lucky_runs(ours, over);
   for (std::size_t i = 0; i < ours.T.size(); ++i) {
@@ -70,7 +71,8 @@ void add_ours(const Runs& ours, Method method, Over over, Panel& panel) {
 
 Curve rival_curve() { return {.name = "best of the others, tuned to the motion", .style = look_rival}; }
 
-// For each error the least run time in which another method reaches it, at that timestep and all finer ones.
+// Returns, for each error, the least run time with which one of the other methods keeps below the error, at that run's
+// timestep and at all finer ones.
 Curve rivals_over_run_time(const std::vector<Runs>& list) {
   Curve curve = rival_curve();
   for (double error = 0.5 * top_m; error > 0.5 * rounding_m; error *= std::pow(10.0, -0.1)) {
@@ -118,7 +120,7 @@ void mark_1_ms(const std::vector<Runs>& list, Over over, Panel& panel) {
   panel.curves.push_back(curve);
 }
 
-// How many times as fast order 2 is as the best other method; 0: not comparable.
+// Returns how many times as fast as the best other method order 2 is; 0 if they aren't comparable.
 double times_as_fast(const std::vector<Runs>& list) {
   const double times = speedup_over_tuned(runs_of(list, method_names[order_2]), list).median;
   return times > 0.0 ? times : 0.0;
@@ -155,7 +157,8 @@ Panel panel_of(const ErrorCase& which, const std::vector<Runs>& list, const Fixe
   return panel;
 }
 
-// Sets one range of x for all panels, in whole decades with some room at the right. Only the outer panels get labels.
+// Sets the same range of x for all panels: whole decades, with some room at the right. Only the outer panels get
+// labels.
 void share_x(Chart& chart, const std::string& x_label) {
   double low = std::numeric_limits<double>::infinity(), high = 0.0;
   for (const Panel& panel : chart.panels) {
@@ -183,7 +186,7 @@ std::string in_words(const ErrorCase& which) {
   return name;
 }
 
-// How many times as fast order 2 is, above or below the line at 1, in one panel for all motions.
+// Returns a panel that shows for all motions how many times as fast order 2 is, above or below a line at 1.
 Panel verdict_panel(const RunsByCase& all) {
   Panel panel{.title = "How many times as fast order 2 is as the best of the others, for the same error",
               .y_label = "times as fast",
@@ -219,7 +222,7 @@ Chart case_panels(const RunsByCase& all, Over over) {
   return chart;
 }
 
-// A method over all motions with steps of 1 ms: its largest error, and the times of its steps.
+// A method's largest error, and its shortest and longest time of a step, over all motions with steps of 1 ms.
 struct Worst {
   double error_m = 0.0, least_ns = std::numeric_limits<double>::infinity(), most_ns = 0.0;
 };
@@ -235,7 +238,7 @@ Worst worst_of(const RunsByCase& all, Method method) {
   return worst;
 }
 
-// The penalty method whose largest error is smallest.
+// Returns the penalty method with the smallest largest error.
 Method best_penalty(const RunsByCase& all) {
   Method best = penalty_euler;
   for (const Method method : {penalty_rk4, penalty_implicit}) {
@@ -250,7 +253,7 @@ std::string nanoseconds(const Worst& worst) {
   return count_text(worst.least_ns) + " to " + count_text(worst.most_ns) + " ns";
 }
 
-// A penalty method's name, for example "semi-implicit Euler".
+// Returns a penalty method's short name, for example "semi-implicit Euler".
 std::string short_title(Method method) {
   const std::string title = method_titles[method];
   return title.substr(title.find(", ") + 2);
@@ -266,10 +269,10 @@ double place_of(std::size_t motion, std::size_t method) {
   return static_cast<double>(motion) + 0.13 * (static_cast<double>(method) - 2.5);
 }
 
-// Motions by name, numbered from left to right.
+// The motions' numbers from left to right, by name.
 using Places = std::map<std::string, std::size_t>;
 
-// Two panels of the motions side by side, every other motion shaded.
+// Two panels with all motions side by side; every other motion is shaded.
 struct Glance {
   Panel error, time;
   Places places{};
@@ -326,7 +329,7 @@ Chart at_a_glance(const RunsByCase& all) {
   for (std::size_t method = 0; method < method_count; ++method) {
     if (method != order_2) add_method(all, method, glance);
   }
-  add_method(all, order_2, glance);  // on top
+  add_method(all, order_2, glance);  // last, so that it is drawn on top
   for (const Method method : {order_2, best_penalty(all)}) {
     const double error_m = worst_of(all, method).error_m;
     if (error_m > 0.0 && std::isfinite(error_m)) {

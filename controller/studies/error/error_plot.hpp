@@ -1,4 +1,4 @@
-// The error study's plots, and their titles, which state the result.
+// Draws the error study's plots, and makes their titles, which state the result.
 #pragma once
 
 #include <filesystem>
@@ -10,13 +10,14 @@
 
 namespace proxarm::studies {
 
-// In how many motions order 2 needs less time for the same error than the best other method, each tuned to the motion.
+// Returns the title that states in how many motions order 2 needs less time for the same error than the best other
+// method with the best tuning for the motion.
 std::string work_answer(const RunsByCase& all);
 
-// In how many motions each order keeps its promise: exact, or an error that falls by T² or faster.
+// Returns the title that states in how many motions each order is exact or has an error that falls as T² or faster.
 std::string order_answer(const RunsByCase& all);
 
-// The largest error with steps of 1 ms, for order 2 and for the best penalty method.
+// Returns the title that states the largest error with steps of 1 ms, for order 2 and for the best penalty method.
 std::string glance_answer(const RunsByCase& all);
 
 // Writes error.svg, error_order.svg and error_at_1ms.svg. Returns warnings.

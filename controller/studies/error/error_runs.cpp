@@ -10,14 +10,14 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Errors that matter to an arm: from a micrometre, which its encoders resolve, to a millimetre.
+// Returns the errors that matter to an arm: from a micrometre, which an arm's encoders resolve, to a millimetre.
 std::vector<double> targets() {
   std::vector<double> list;
   for (int i = 0; i <= 30; ++i) list.push_back(std::pow(10.0, -6.0 + 0.1 * i));
   return list;
 }
 
-// The runs with the least run time for that error; nullptr if none reach it.
+// Returns the runs with the least run time for the error `target`; nullptr if no runs reach that error.
 const Runs* cheapest(const std::vector<const Runs*>& list, double target) {
   const Runs* best = nullptr;
   for (const Runs* runs : list) {
@@ -57,7 +57,7 @@ double tuned_cost(const std::vector<Runs>& list, double target) {
 bool matches(const Fixed& fixed, const Runs& runs) {
   if (runs.method != fixed.method) return false;
   if (runs.tuning.staggered != fixed.tuning.staggered) return false;
-  // Cases without friction or surfaces have fewer parameters.
+  // In cases without friction or surfaces the tuning has fewer parameters.
   const bool k = runs.tuning.stiffness_N_per_m == fixed.tuning.stiffness_N_per_m,
              c = runs.tuning.damping_ratio == fixed.tuning.damping_ratio;
   return k && c && (runs.tuning.friction_slope == fixed.tuning.friction_slope || runs.tuning.friction_slope == 1.0);
@@ -78,7 +78,8 @@ std::size_t Runs::at_1_ms() const {
   throw std::out_of_range("no run with steps of 1 ms of " + method);
 }
 
-// A step's time is its ratio to a step of (26), measured alternately, times the least time of that step.
+// The time of a method's step is computed as its measured ratio to the time of a step of (26), multiplied by the least
+// measured time of a step of (26).
 RunsByCase collect(const Table& table) {
   RunsByCase all;
   std::map<std::string, double> reference_ns;
@@ -197,7 +198,7 @@ Fit fit_order(const Runs& runs) {
     xy += (x[i] - mx) * (y[i] - my);
   }
   const double slope = xy / xx;
-  if (slope < 0.0) return {0.0, 0.0};  // an error that grows with the number of steps is rounding
+  if (slope < 0.0) return {0.0, 0.0};  // an error that grows with finer steps is rounding
   for (std::size_t i = 0; i < x.size(); ++i) rr += std::pow(y[i] - my - slope * (x[i] - mx), 2);
   return {slope, std::sqrt(rr / n)};
 }

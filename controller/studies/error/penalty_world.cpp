@@ -7,7 +7,8 @@ namespace proxarm::studies {
 using models::Mat3;
 using models::Vec3;
 
-// A surface as seen from q: q's height above it (negative inside), its normal n, and ∂n/∂q = bend (1 − n nᵀ).
+// What a surface is for a point q: q's height above the surface (negative inside), the surface's normal n, and the
+// factor in ∂n/∂q = bend (1 − n nᵀ).
 struct PenaltyWorld::Touch {
   double height;
   Vec3 n;
@@ -53,8 +54,8 @@ Vec3 PenaltyWorld::force(const Vec3& q_0, double T, const Vec3& v, Mat3& slope) 
   return f;
 }
 
-// Adds one surface's force, and its derivative with respect to v while q moves with v: ∂q/∂v = T, so ∂n/∂v = T bend (1
-// − n nᵀ).
+// Adds one surface's force to `f`, and the force's derivative with respect to v to `slope`. As q is q₀ + T v, ∂q/∂v =
+// T, and so ∂n/∂v = T bend (1 − n nᵀ).
 void PenaltyWorld::press(const Touch& at, double T, const Vec3& v, Vec3& f, Mat3* slope) const noexcept {
   const Vec3& n = at.n;
   const double v_n = n.dot(v), f_n = -k_ * at.height - c_ * v_n;

@@ -1,7 +1,9 @@
-// The world of the error study's penalty methods, in place of ℳ: springs, dampers and friction dampers.
+// Computes the world's force for the error study's penalty methods, which replace ℳ by springs, dampers and friction
+// dampers.
 //
-// A wall pushes in proportion to the depth and to the speed into it, and never pulls; friction is a damper up to μ f_n.
-// Distances, normals and derivatives of the plane or sphere are in closed form, so a step does no unnecessary work.
+// A wall pushes in proportion to the depth and to the speed into the wall, and never pulls. Friction is a damper up to
+// the force μ f_n. Distances, normals and derivatives of the plane or sphere are in closed form, so a step does no
+// unnecessary work.
 #pragma once
 
 #include <vector>
@@ -13,7 +15,7 @@ namespace proxarm::studies {
 // The parameters of a penalty method.
 struct Tuning {
   double stiffness_N_per_m = 0.0, damping_ratio = 0.0, friction_slope = 1.0;
-  // The velocity starts half a step before the position, as in leapfrog.
+  // Whether velocities belong to times half a step before the positions' times, as in leapfrog.
   bool staggered = false;
 
   bool operator==(const Tuning&) const = default;
@@ -23,10 +25,11 @@ class PenaltyWorld {
  public:
   PenaltyWorld(const ErrorCase& which, const Tuning& tuning);
 
-  // The force on the tool at q with velocity v.
+  // Returns the force on the tool at q with velocity v.
   [[nodiscard]] models::Vec3 force(const models::Vec3& q, const models::Vec3& v) const noexcept;
 
-  // The force at q₀ + T v with velocity v, and its derivative with respect to v.
+  // Returns the force on the tool at q₀ + T v with velocity v. Sets `slope` to the force's derivative with respect to
+  // v.
   [[nodiscard]] models::Vec3 force(const models::Vec3& q_0, double T, const models::Vec3& v,
                                    models::Mat3& slope) const noexcept;
 

@@ -10,7 +10,7 @@ namespace {
 using models::Vec3;
 using models::Wrench;
 
-// The centre's position in the plane and the angle about y; also used for their derivatives.
+// The position of the tool's centre in the plane, and the tool's angle about y. Also used for the derivatives of both.
 struct Planar {
   double x = 0.0, z = 0.0, angle = 0.0;
 };
@@ -24,7 +24,7 @@ ToolState state(const Planar& at, const Planar& velocity, const Planar& accelera
   return {{Vec3(at.x, 0.0, at.z), models::rotation_by(at.angle * Vec3::UnitY())}, twist(velocity), twist(acceleration)};
 }
 
-// ∫∫ sin(ωt) from rest, and its derivatives.
+// The distance ∫∫ sin(ωt) from rest, and its two derivatives.
 struct Pushed {
   double way, velocity, acceleration;
 };
@@ -33,8 +33,9 @@ Pushed pushed(double t, double omega) {
           std::sin(omega * t)};
 }
 
-// A centre that turns about a fixed point at distance d under a constant force: φ'' = d (−sin φ F_x + cos φ F_z)/I,
-// with I about that point. Classical Runge-Kutta with 400 steps, whose error is 1e-13 rad.
+// The motion of a tool whose centre turns about a fixed point at distance d under a constant force: φ'' = d (−sin φ F_x
+// + cos φ F_z)/I, with the inertia I about that point. The equation is solved by classical Runge-Kutta with 400 steps,
+// whose error is 1e-13 rad.
 struct Swing {
   double d_m, inertia_kg_m2, force_x_N, force_z_N, from_rad;
 
@@ -58,7 +59,7 @@ struct Swing {
     }
     return a;
   }
-  // About (x, z); the tool's angle is `sense` (φ − zero).
+  // Returns the tool's state if the fixed point is (x, z) and the tool's angle is `sense` (φ − zero).
   [[nodiscard]] ToolState state_at(const Angle& a, double x, double z, double sense, double zero) const {
     const double s = std::sin(a.phi), c = std::cos(a.phi), w = a.rate, alpha = acceleration(a.phi);
     return state({x + d_m * c, z + d_m * s, sense * (a.phi - zero)}, {-d_m * s * w, d_m * c * w, sense * w},
@@ -93,7 +94,7 @@ ToolCase turn() {
   return out;
 }
 
-// Pulled at its centre, the ball accelerates with M + J/r².
+// A ball that rolls and is pulled at its centre accelerates like a mass of M + J/r².
 ToolCase roll() {
   ToolCase out{.name = "roll",
                .title = "a ball rolls",
@@ -110,7 +111,7 @@ ToolCase roll() {
   return out;
 }
 
-// The ball slides at first; friction spins it up until it rolls.
+// A ball slides at first, and friction spins the ball up until it rolls.
 ToolCase skid() {
   ToolCase out{.name = "skid",
                .title = "a ball slides until it rolls",
@@ -128,7 +129,7 @@ ToolCase skid() {
   return out;
 }
 
-// Pushed at its middle, the box turns about the edge over which it tips.
+// A box that is pushed at its middle turns about the edge over which it tips.
 ToolCase tip() {
   constexpr double half_m = 0.03, high_m = 0.04;
   ToolCase out{.name = "tip",
@@ -143,7 +144,7 @@ ToolCase tip() {
   return out;
 }
 
-// The box falls from a tilt of 0.2 rad onto its face, which is so wide that the box rests at once.
+// A box falls from a tilt of 0.2 rad onto its face. The face is so wide that the box rests at once.
 ToolCase fall() {
   constexpr double half_m = 0.06, high_m = 0.02, press_N = 2.0;
   ToolCase out{.name = "fall",
@@ -166,7 +167,7 @@ ToolCase fall() {
   return out;
 }
 
-// Without friction, one end on the floor and one on the wall, so the middle moves on a circle.
+// A rod without friction has one end on the floor and the other end on the wall, so the rod's middle moves on a circle.
 ToolCase ladder() {
   constexpr double length_m = 0.2, radius_m = 0.01;
   ToolCase out{.name = "ladder",

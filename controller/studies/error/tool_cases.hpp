@@ -1,7 +1,7 @@
-// Motions of a rigid tool whose exact solutions are known, for the study of its errors.
+// Defines motions of a rigid tool, with known exact solutions, for the study of a tool's errors (tool_error.hpp).
 //
-// All lie in the plane y = 0 of W, with rotations about y; 𝒢 doesn't know that. Units are m, kg, N, s. The tool's
-// reference point is its centre of mass.
+// All motions lie in the plane y = 0 of W, with rotations about y, but 𝒢 computes them in space. The tool's reference
+// point is the tool's centre of mass. Units: m, kg, N, s.
 #pragma once
 
 #include <functional>
@@ -24,11 +24,11 @@ struct ToolCase {
   double mass_kg = 4.0, inertia_kg_m2 = 0.01;
   models::Tool tool{};
   std::vector<models::RigidObject> objects{};
-  std::function<models::Wrench(double)> hand{};  // at the centre, at a time
+  std::function<models::Wrench(double)> hand{};  // wrench at the centre of mass, at a time
   std::function<ToolState(double)> exact{};
 };
 
-// Duration of each motion.
+// The duration of each motion.
 inline constexpr double tool_case_s = 0.96;
 
 std::vector<ToolCase> tool_cases();

@@ -27,7 +27,7 @@ constexpr std::array step_counts{60, 120, 240, 480, 960, 1920, 3840, 7680};
 constexpr int steps_of_1_ms = 960;
 
 struct ToolRun {
-  double place_m = 0.0, turn_rad = 0.0;  // rms
+  double place_m = 0.0, turn_rad = 0.0;  // rms over the steps
   int unresolved = 0;
 };
 
@@ -63,7 +63,7 @@ ToolRun run_from(const ToolCase& which, const models::PoseAlgorithm& world, int 
   return run;
 }
 
-// The least time of several rounds.
+// Returns the time of a step, as the least of several rounds.
 double step_ns(const ToolCase& which, const models::PoseAlgorithm& world, int steps) {
   const double T = tool_case_s / steps;
   double least = std::numeric_limits<double>::infinity();
@@ -156,7 +156,7 @@ json ToolErrorStudy::headline(const Table& table, const Options& /*options*/) co
 
 namespace {
 
-// The largest error at the timestep nearest to 1 ms, and its motion.
+// The largest error at the timestep nearest to 1 ms, and the motion with that error.
 struct WorstTool {
   double period_s = 0.0, error = 0.0;
   std::string motion{};
@@ -185,7 +185,7 @@ std::string motion_title(const std::string& name) {
   return name;
 }
 
-// Errors below least_tool_error are rounding and drawn at drawn_least.
+// Errors below least_tool_error are rounding, and are drawn at drawn_least.
 constexpr double least_tool_error = 1e-10, drawn_least = 2.5e-12, tool_bottom = 1e-12;
 
 Panel tool_panel(const Table& table, const char* error, const char* title, const char* unit) {
@@ -203,7 +203,7 @@ Panel tool_panel(const Table& table, const char* error, const char* title, const
               .y_spans = {{tool_bottom, least_tool_error, "rounding"}}};
   int style = 0;
   for (const ToolCase& which : tool_cases()) {
-    // Larger, since other curves may lie on the first one.
+    // The first curve's marks are larger, because other curves may lie on that curve.
     Curve curve{.name = which.title, .style = style, .marks = true, .mark_size = style == 0 ? 1.5 : 0.9};
     ++style;
     for (std::size_t row = 0; row < table.rows(); ++row) {

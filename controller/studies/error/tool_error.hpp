@@ -1,10 +1,10 @@
-// Measures the error of (26) for a rigid tool and the time of a step, on motions with known exact solutions
-// (tool_cases.hpp), with steps of 16 ms to 0.125 ms.
+// Measures the error of (26) for a rigid tool, and the time of a step. The motions have known exact solutions
+// (tool_cases.hpp), and the steps are 16 ms to 0.125 ms long.
 //
-// Error: rms over all steps of the reference point's distance and of the tool's angle from the exact motion. The proxy
-// gets the hand's wrench at the samples only. Its pose q(k), made from h(t_k), belongs to t_{k+1}, and its first
-// velocity to half a step before the start. The place of an event within a step is chance, so each run is repeated with
-// starts spread over a step, and the median counts.
+// The errors are the rms over all steps of the reference point's distance from its exact place, and of the tool's angle
+// from its exact orientation. The proxy gets the hand's wrench at the samples only. The pose q(k) is made from h(t_k)
+// and compared at t_{k+1}. The velocity given at the start is the exact one half a step earlier. Where within a step an
+// event happens is chance, so each run is repeated with starts spread over a step, and the median counts.
 #pragma once
 
 #include "controller/studies/common/study.hpp"
@@ -23,7 +23,7 @@ class ToolErrorStudy final : public Study {
   std::string text(const nlohmann::json& headline) const override;
 };
 
-// The plot's title: the largest error of a tool with steps of 1 ms, and in which motion.
+// Returns the plot's title: the largest error of a tool with steps of 1 ms, and in which motion.
 std::string tool_error_answer(const Table& table);
 
 }  // namespace proxarm::studies

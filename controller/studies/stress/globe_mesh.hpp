@@ -1,4 +1,4 @@
-// Makes the convex globe of flat triangles that studies render.
+// Makes the globe of flat triangles that studies render.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,8 @@
 
 namespace proxarm::studies {
 
-// `rings` ≥ 2 steps from pole to pole (± z), `sectors` ≥ 3 around; `place` maps points of the unit sphere.
+// Returns a globe with `rings` ≥ 2 steps from pole to pole (± z) and `sectors` ≥ 3 steps around. `place` maps each
+// vertex on the unit sphere to the vertex of the mesh.
 scenes::MeshShape globe_mesh(std::uint32_t rings, std::uint32_t sectors,
                              const std::function<models::Vec3(const models::Vec3&)>& place);
 

@@ -56,7 +56,7 @@ Shape some_mesh(Random& random) {
   return globe_mesh(rings, sectors, [&](const Vec3& x) { return Vec3(pose * Vec3(half.cwiseProduct(x))); });
 }
 
-// A globe with dents, star-shaped about its middle.
+// Returns a globe with dents that is star-shaped about its middle.
 Shape some_concave_mesh(Random& random) {
   const auto rings = static_cast<std::uint32_t>(3 + random.below(5)),
              sectors = static_cast<std::uint32_t>(4 + random.below(8));
@@ -209,7 +209,7 @@ RandomScene random_layer_scene(Random& random) {
   for (int i = 2 + random.below(4); i > 0; --i) {
     scene.objects.push_back(any_object(random));
     Object& object = scene.objects.back();
-    // The thinnest object is 20 mm thick.
+    // Layers are at most 9 mm thick, because the thinnest object is 20 mm thick.
     const double thickness = random.log_uniform(1e-4, 9e-3), stiffness = random.log_uniform(100.0, 1e6);
     if (random.chance(0.7)) object.layer = scenes::ElasticLayer{thickness, stiffness};
     if (moves && random.chance(0.5)) object.motion = some_motion(random);

@@ -1,4 +1,4 @@
-// Draws random worlds for the studies.
+// Draws random worlds for the stress study.
 #pragma once
 
 #include <string>
@@ -17,10 +17,12 @@ struct RandomScene {
 
 RandomScene random_scene(Random& random);
 
-// Worlds of meshes: concave ones and moving ones (kinds concave_mesh, moving_mesh), half of them with another object.
+// Draws a world with a concave mesh (kind concave_mesh) or a moving mesh (kind moving_mesh). Half of these worlds have
+// another object.
 RandomScene random_mesh_scene(Random& random);
 
-// Two to five objects, most of them with elastic layers, some of them moving (kinds layers, moving_layers).
+// Draws a world of two to five objects, most of them with elastic layers. In kind `layers` all objects stand, in kind
+// `moving_layers` some objects move.
 RandomScene random_layer_scene(Random& random);
 
 }  // namespace proxarm::studies

@@ -77,7 +77,7 @@ scenes::Shape some_hollow(Random& random) {
   }
 }
 
-// A star-shaped mesh with bumps of some per cent, or with dents.
+// Returns a star-shaped mesh with bumps of some per cent of the radius, or with dents.
 scenes::MeshShape some_star(Random& random, const Vec3& middle, double radius, int finest) {
   const bool rough = random.chance(0.5);
   const double high = rough ? 0.04 : random.uniform(0.1, 0.4);
@@ -161,7 +161,8 @@ RandomToolScene random_mesh_tool_scene(Random& random) {
   const int which = random.below(3);
   const bool tool = which > 0, object = which != 1;
   made.tool.parts.push_back(tool ? some_mesh_tool(random) : random.chance(0.3) ? some_hull(random) : some_part(random));
-  // The judge has no distance between a hull and round objects, so these don't occur together.
+  // The judge (ToolLaws) can't compute the distance between a convex hull and a round object, so these don't occur
+  // together.
   const bool sharp = std::holds_alternative<models::ConvexTool>(made.tool.parts.front().shape);
   if (object) {
     const Vec3 middle = random.in_box(0.03);

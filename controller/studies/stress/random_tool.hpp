@@ -17,17 +17,18 @@ struct RandomToolScene {
   std::string kind;  // of the world: planes, solids, boxes, hollow, meshes
 };
 
-// One to four planes, or two to six solids (boxes, spheres and capsules; for a convex tool only boxes), or one hollow
-// box, sphere, capsule or cylinder with a tool that fits in. Tools of 3 to 60 mm: sphere, capsule, box, convex, or two
-// of these. Nothing moves.
+// Draws a world of one to four planes, or of two to six solids (boxes, spheres and capsules; only boxes if the tool is
+// convex), or of one hollow box, sphere, capsule or cylinder that has room for the tool. Tools measure 3 to 60 mm, and
+// are a sphere, a capsule, a box, a convex hull, or two of these. No object moves.
 RandomToolScene random_tool_scene(Random& random);
 
-// The same with closed meshes of 20 to 350 triangles, as bumpy balls or dented stars: as an object, as the tool, or
-// both, with up to two more solids or planes.
+// Draws a world with closed meshes of 20 to 350 triangles, which are bumpy balls or dented stars. The object is a mesh,
+// or the tool is one, or both are. Up to two further objects are solids or planes. No object moves.
 RandomToolScene random_mesh_tool_scene(Random& random);
 
-// Sets three objects in four in motion: to and fro with 1 mm/s to 0.3 m/s at 0.3 to 8 Hz, straight ahead with up to 20
-// mm/s, or about an axis through their middle with up to 3 rad/s (planes: about their normal).
+// Sets each object in motion with a probability of three in four: to and fro with 1 mm/s to 0.3 m/s at 0.3 to 8 Hz,
+// straight ahead with up to 20 mm/s, or turning with up to 3 rad/s. An object turns about an axis through its middle, a
+// plane about its normal.
 void set_in_motion(Random& random, scenes::Scene& scene);
 
 }  // namespace proxarm::studies

@@ -18,7 +18,7 @@ using nlohmann::json;
 
 double number(std::int64_t value) { return static_cast<double>(value); }
 
-// Sum of a column over all runs, or over those in worlds of one kind.
+// Returns the sum of a column over all runs, or, if `kind` isn't empty, over the runs in worlds of that kind.
 std::int64_t sum(const Table& table, const char* name, const std::string& kind = {}) {
   const std::size_t column = table.column(name), kinds = table.column("kind");
   double total = 0.0;
@@ -45,7 +45,7 @@ json by_kind(const Table& table) {
   return all;
 }
 
-// Up to 50 runs with a violation.
+// Returns up to 50 runs with a violation.
 json failing(const Table& table) {
   json runs = json::array();
   const std::size_t first_step = table.column("first_step"), run_seed = table.column("run_seed");
@@ -155,7 +155,7 @@ std::int64_t violations_in(const Table& table) {
   return violations;
 }
 
-// A decade of T²F/M, the distance by which one step's force would move the proxy. Each run belongs to one.
+// The runs in one decade of T²F/M, which is the distance by which a run's force would move the free proxy in one step.
 struct Bin {
   double push_m = 0.0, steps = 0.0, violations = 0.0;
   std::array<double, 2> met{};
@@ -182,7 +182,8 @@ std::vector<Bin> bins_of(const Table& table) {
   return bins;
 }
 
-// The number of steps that broke each law, and of steps that are counted separately. 0 is drawn at the bottom.
+// Returns a panel with the number of steps that broke each law, and of the steps that are counted separately. A number
+// of 0 is drawn at the bottom.
 Panel counts_panel(const Table& table) {
   constexpr double none = 0.5;
   constexpr std::array names{"numbers finite", "nothing inside",    "law of contact", "any stiffness",
@@ -201,7 +202,7 @@ Panel counts_panel(const Table& table) {
               .y_low = 0.2,
               .y_high = 10.0 * steps,
               .levels = {{steps, "all steps"}}};
-  std::array<Curve, 3> curves;  // of laws; and as in the panel below
+  std::array<Curve, 3> curves;  // one for the laws, and two as in the panel below
   constexpr std::array styles{0, 5, 3};
   for (std::size_t i = 0; i < curves.size(); ++i) {
     curves[i] = {.style = styles[i], .marks = true, .line = false, .mark_size = 1.5};
@@ -218,7 +219,8 @@ Panel counts_panel(const Table& table) {
   return panel;
 }
 
-// Shares of steps by distance. If no step broke a law: the share that is excluded with 95 % confidence, 3/n.
+// Returns a panel with shares of steps by T²F/M. If none of n steps broke a law, the panel shows 3/n: with 95 %
+// confidence, the true share of such steps is below 3/n.
 Panel stress_panel(const Table& table) {
   Panel panel{.title = "The last two, by how far the force would carry the proxy",
               .x_label = "T²F/M (m)",

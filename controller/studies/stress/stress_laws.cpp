@@ -30,7 +30,7 @@ bool is_convex(const models::TriangleMesh& mesh) {
   return true;
 }
 
-// Distance from a convex mesh: the largest height of x over a face.
+// Returns the distance of x from a convex mesh, as the largest height of x over a face.
 double convex_distance(const scenes::Object& object, const Vec3& x) {
   const models::TriangleMesh& mesh = *std::get<scenes::MeshShape>(object.shape).mesh;
   double highest = -infinity;
@@ -40,8 +40,9 @@ double convex_distance(const scenes::Object& object, const Vec3& x) {
   return highest;
 }
 
-// If slipping contacts press against each other, their forces may far exceed f, and the rounding of their axes is
-// multiplied by these forces. Returns the sum of the forces (N) if each contact bears one along its axis, else 0.
+// Returns the sum of the contacts' forces (N) if forces along the cones' axes add up to f and none of them pulls;
+// otherwise 0. If slipping contacts press against each other, their forces may far exceed f, and multiply the rounding
+// of the axes.
 double squeeze(const Vec3& f, const std::vector<models::ForceCone>& cones) {
   if (cones.size() < 2 || cones.size() > 3) return 0.0;
   Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();
@@ -92,13 +93,14 @@ bool Laws::obeyed(const Call<N>& call) const {
   const Vec3& f = objects.f;
   const double coulomb = objects.coulomb_N, K = objects.K;
   double tolerance = coulomb * (1.0 + 1e-9) + condition(call) * 64.0 * epsilon * K * call.size();
-  // On a curved surface, a p̂ that is deep compared with the radius (0.01 m is the smallest here) amplifies rounding
-  // again.
+  // On a curved surface, a p̂ that is deep compared with the surface's radius amplifies rounding further. The smallest
+  // radius here is 0.01 m.
   tolerance += f.norm() * 64.0 * epsilon * (call.p - call.r).norm() / 0.01;
-  // A Coulomb medium's force depends on how far the proxy moves in it, which is uncertain by rounding if that is short.
+  // A Coulomb medium's force depends on the proxy's displacement in the medium. The relative rounding of that
+  // displacement is large if the displacement is short.
   const double moved = (call.r - call.q).norm();
   if (moved > 0.0) tolerance += coulomb * std::min(16.0 * epsilon * call.size() / moved, 1e-3);
-  double unsure = 8.0 * epsilon;  // of a cone's axis
+  double unsure = 8.0 * epsilon;  // of the direction of a cone's axis
   const auto friction = [&](const Contact<N>& contact) -> std::optional<double> {
     const auto object = static_cast<std::size_t>(contact.object);
     return N == 1 || object >= scene_.objects.size() ? 0.0 : scene_.objects[object].friction;

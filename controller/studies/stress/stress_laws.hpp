@@ -1,4 +1,5 @@
-// The judge's own copy of the laws of contact forces, which hold for any 𝒢, for the stress study.
+// Judges a point's steps for the stress study. The laws of contact forces are written here a second time, independently
+// of 𝒢's code, and hold for any 𝒢.
 #pragma once
 
 #include <cstddef>
@@ -11,13 +12,14 @@
 
 namespace proxarm::studies {
 
-// One call of 𝒢 by the proxy.
+// One call of 𝒢 by the proxy: r = 𝒢(K, p, q), with p for p̂.
 template <int N>
 struct Call {
   double K = 0.0;
   models::Vec<N> p = models::Vec<N>::Zero(), q = models::Vec<N>::Zero(), r = models::Vec<N>::Zero();
   models::StepTime time;
-  std::vector<models::Vec3> carried;  // q moved with each object: where 𝒢 starts for meshes at order 2
+  // By object, for moving meshes: q moved with the mesh, where 𝒢 starts at order 2.
+  std::vector<models::Vec3> carried;
   std::vector<models::Contact<N>> contacts;
   bool unresolved = false;
 
@@ -25,7 +27,7 @@ struct Call {
   [[nodiscard]] double size() const { return 0.1 + r.norm() + p.norm() + q.norm() + (r - p).norm(); }
 };
 
-// The factor by which the contacts' geometry amplifies rounding.
+// Returns the factor by which the contacts' geometry amplifies rounding.
 template <int N>
 double condition(const Call<N>& call) {
   return models::rounding_amplification<N>(call.contacts);
@@ -44,8 +46,8 @@ class Laws {
     return scene_.guide && scene_.guide->kind == scenes::GuideDescription::Kind::polyline;
   }
 
-  // The force f of the objects alone: the known force of the media is subtracted, except for a Coulomb medium's, whose
-  // size is returned. K includes the viscous media.
+  // The force of the objects alone. `f` is the call's force without the known forces of media. A Coulomb medium's force
+  // isn't subtracted; its size is coulomb_N. `K` includes the viscous media.
   struct ObjectForce {
     models::Vec3 f;
     double coulomb_N = 0.0, K = 0.0;
@@ -53,20 +55,21 @@ class Laws {
   template <int N>
   [[nodiscard]] ObjectForce without_media(const Call<N>& call) const;
 
-  // Whether the contacts can bear f by (17).
+  // Returns whether f is a sum of contact forces that obey (17).
   template <int N>
   [[nodiscard]] bool obeyed(const Call<N>& call) const;
 
-  // How far the objects have been moved, m; their places are rounded in proportion.
+  // Returns the largest distance by which an object has been moved, m. The rounding of objects' places is in proportion
+  // to that distance.
   [[nodiscard]] double carriage(double time_s) const;
 
   // Returns q moved with the object.
   [[nodiscard]] models::Vec3 carried(std::size_t object, const models::StepTime& time, const models::Vec3& q) const;
 
-  // Depth of r inside the objects, m.
+  // Returns the largest depth of r inside an object, m. If negative, r is at least that far away from all objects.
   [[nodiscard]] double depth(const models::Vec3& r, double time_s) const;
 
-  // Curvature of a surface, which limits the work of f on the proxy.
+  // The curvature of an object's surface, which limits the work of f on the proxy. Sets radius_m for round objects.
   enum class Curvature { flat_or_concave, convex, edged };
   [[nodiscard]] Curvature curvature(std::size_t object, double& radius_m) const;
 
@@ -74,7 +77,7 @@ class Laws {
   const scenes::Scene& scene_;
   bool moving_ = false, meshes_ = false;
   std::vector<models::ScriptedMotion> scripts_;
-  std::vector<bool> convex_;  // of meshes
+  std::vector<bool> convex_;  // for each object: whether it is a convex mesh
 };
 
 }  // namespace proxarm::studies

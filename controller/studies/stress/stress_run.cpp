@@ -26,7 +26,7 @@ using models::Vec3;
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr int steps_per_run = 1000;
 
-// Passes all calls on to 𝒢 and remembers the last one.
+// Passes all calls on to 𝒢, and remembers the last call.
 template <int N>
 class Witness final : public models::GeometricAlgorithm<N> {
  public:
@@ -68,7 +68,7 @@ class Witness final : public models::GeometricAlgorithm<N> {
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return g_.unresolved_steps(); }
 
   [[nodiscard]] const Call<N>& call() const noexcept { return call_; }
-  // Repeats the call with another stiffness and another p.
+  // Repeats the last call with another stiffness and another p.
   Call<N> ask(double K, const Vec<N>& p) {
     Call<N> other = call_;
     const std::uint64_t before = g_.unresolved_steps();
@@ -82,11 +82,12 @@ class Witness final : public models::GeometricAlgorithm<N> {
 
  private:
   models::GeometricAlgorithm<N>& g_;
-  std::vector<std::unique_ptr<models::MovingObstacle>> movers_;  // of meshes, by object
+  // One per object; null unless the object is a moving mesh.
+  std::vector<std::unique_ptr<models::MovingObstacle>> movers_;
   Call<N> call_;
 };
 
-// A force that a hand, a machine or a broken sensor might make.
+// Makes forces as a hand, a machine or a broken sensor might make them.
 class Push {
  public:
   explicit Push(Random& random, const Vec3& towards)
@@ -112,7 +113,7 @@ class Push {
       case 2:  // a sine
         f *= std::sin(turn_ * step);
         break;
-      case 3:  // a random walk of its direction
+      case 3:  // a random walk of the direction
         direction_ = (direction_ + 0.1 * random_.in_box(1.0)).normalized();
         break;
       default:  // towards an object
@@ -120,7 +121,8 @@ class Push {
         break;
     }
     if (noise_N_ > 0.0) f += noise_N_ * random_.in_box(1.0);
-    // A spring and a damper keep the proxy near, with a frequency at which the timestep is stable.
+    // A spring and a damper keep the proxy near the origin. Their frequency is so low that they are stable at this
+    // timestep.
     const double omega = centring_ / period_s;
     Vec3 back = -mass_kg * omega * (omega * q + v);
     const double limit = 1e6;
@@ -144,7 +146,8 @@ class Judge {
   Judge(const Laws& laws, Witness<N>& g, Random& random, Tally& tally, std::string* report)
       : laws_(laws), g_(g), random_(random), tally_(tally), report_(report) {}
 
-  // `before`: the proxy before the step.
+  // Judges the step k that the proxy has just made. `fault`: the proxy reported a fault. `before`: the proxy before the
+  // step.
   void step(std::int64_t k, bool fault, const Vec<N>& before) {
     const Call<N>& call = g_.call();
     step_ = k;
@@ -184,7 +187,7 @@ class Judge {
     const double depth = laws_.depth(lift<N>(call.r), call.time.time_s);
     if (call.unresolved) return;
     tally_.deepest_m = std::max(tally_.deepest_m, depth / (1.0 + call.r.norm() + call.p.norm()));
-    // Rounding of r, of distances, and of an object's motion, each some units of ‖r‖ ε.
+    // Allows for the rounding of r, of distances, and of an object's motion, each of which is some units of ‖r‖ ε.
     if (depth > 1e-12 * (1.0 + call.r.norm()) * condition(call) + 16.0 * epsilon * call.p.norm())
       note(inside, call, depth);
   }
@@ -229,7 +232,7 @@ class Judge {
                            8.0 * epsilon * laws_.carriage(call.time.time_s) + slip_rounding(call);
     const double error = (other.r - call.r).norm();
     if (error <= allowed) return;
-    // If two answers obey the laws of the same state, Coulomb's law has several solutions, and 𝒢 isn't at fault.
+    // If both answers obey the laws in this state, Coulomb's law has several solutions, and 𝒢 isn't at fault.
     if (other.unresolved) {
       ++tally_.unresolved;
     } else if (other.r.allFinite() && (laws_.bends() || (laws_.judged() && laws_.template obeyed<N>(other)))) {
@@ -239,8 +242,9 @@ class Judge {
     }
   }
 
-  // Whether and how little a proxy slips in a Coulomb medium is found from a hundredth to a thousandth of its motion
-  // (coulomb_step.hpp), so the rounding of r is multiplied by the inverse: half a picometre per metre.
+  // Returns the rounding of the slip in a Coulomb medium; 0 without such a medium. Whether and how little the proxy
+  // slips is found from a hundredth to a thousandth of the proxy's motion (coulomb_step.hpp), so the rounding of r is
+  // multiplied by up to about 1000. That is half a picometre per metre.
   [[nodiscard]] double slip_rounding(const Call<N>& call) const {
     return laws_.template without_media<N>(call).coulomb_N > 0.0 ? 2048.0 * epsilon * (call.r.norm() + call.q.norm())
                                                                  : 0.0;
@@ -254,7 +258,7 @@ class Judge {
   std::int64_t step_ = 0;
 };
 
-// Finds a place a millimetre outside all objects; false if none was found by chance.
+// Finds a random place at least a millimetre outside all objects. Returns false if no try found one.
 template <int N>
 bool find_start(Random& random, const Laws& laws, Vec<N>& q) {
   for (int k = 0; k < 300; ++k) {
@@ -273,7 +277,7 @@ void run_in(const scenes::Scene& scene, const scenes::CompiledScene& compiled, c
   controller::AdmittanceConfig config;
   config.mass_kg = tally.mass_kg = random.log_uniform(1e-3, 1e3);
   config.period_s = tally.period_s = random.log_uniform(1e-5, 50e-3);
-  const bool first_order = random.chance(0.7);  // drawn in any case, so that a seed's worlds stay the same
+  const bool first_order = random.chance(0.7);  // drawn for all kinds, so that a seed gives the same worlds
   config.order = tally.order = first_order && worlds != StressWorlds::order_2 ? 1 : 2;
   if (random.chance(0.3)) config.damping_Ns_per_m = random.log_uniform(0.1, 1e3);
   AdmittanceProxy<N> proxy(config, g);
@@ -282,8 +286,8 @@ void run_in(const scenes::Scene& scene, const scenes::CompiledScene& compiled, c
   Push push(random, towards);
   tally.force_N = push.size_N();
   Judge<N> judge(laws, g, random, tally, report);
-  if (laws.depth(lift<N>(q0), 0.0) >= 0.0) return;  // no free place: counted without steps
-  // A mesh that covered the proxy a period before would hold it from inside.
+  if (laws.depth(lift<N>(q0), 0.0) >= 0.0) return;  // no place was found; the run counts, with no steps
+  // A moving mesh that covered the proxy a period before the start would hold the proxy inside.
   if (laws.meshes() && laws.depth(lift<N>(q0), -config.period_s) >= 0.0) return;
   for (int k = 0; k < steps_per_run; ++k) {
     const Vec<N> before = proxy.q();
@@ -291,7 +295,7 @@ void run_in(const scenes::Scene& scene, const scenes::CompiledScene& compiled, c
         push(k, lift<N>(proxy.q()), lift<N>(proxy.velocity()), config.mass_kg, config.period_s).template head<N>();
     const bool fault = proxy.step(h) != controller::ProxyFault::none;
     judge.step(k, fault, before);
-    // A session would end here; the proxy stays beyond a mesh through which it was pushed.
+    // A session would end here, because a proxy that was pushed through a mesh stays on its other side.
     if (fault || (laws.meshes() && g.squeezed())) return;
   }
 }

@@ -1,5 +1,5 @@
-// Runs the stress study once (stress.hpp): draws a world, a proxy and a force from the run's seed, and judges the
-// steps.
+// Makes one run of the stress study (stress.hpp): draws a world, a proxy and a force from the run's seed, and judges
+// the steps.
 #pragma once
 
 #include <array>
@@ -8,9 +8,14 @@
 
 namespace proxarm::studies {
 
-// The worlds: random_scene(), random_mesh_scene() or random_layer_scene(). Each is its own study, so that a change of
-// one doesn't change the others' worlds. order_2: random_scene() with order 2 only. tools: rigid tools in
-// random_tool_scene() (tool_run.hpp); moving_tools: the same in motion.
+// The kinds of worlds. Each kind is a study of its own, so that a change of one kind doesn't change the worlds of the
+// others.
+//   all            random_scene()
+//   meshes         random_mesh_scene()
+//   layers         random_layer_scene()
+//   order_2        random_scene(), with order 2 only
+//   tools          rigid tools in random_tool_scene() or random_mesh_tool_scene() (tool_run.hpp)
+//   moving_tools   as `tools`, with moving objects
 enum class StressWorlds { all, meshes, layers, order_2, tools, moving_tools };
 
 enum Invariant { finite, inside, law, stiffness, work, invariant_count };
@@ -37,7 +42,7 @@ struct Tally {
   }
 };
 
-// `report`, if not null, gets a line for each violation.
+// Makes the run of this seed, and returns its counts. `report`, if not null, gets a line for each violation.
 Tally run_seed(std::uint64_t seed, StressWorlds worlds, std::string* report);
 
 }  // namespace proxarm::studies

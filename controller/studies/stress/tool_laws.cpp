@@ -18,12 +18,14 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-constexpr double kSlips_m = 1e-9;   // smallest slip that must be reported: a million roundings of a displacement
-constexpr double kShort_m = 1e-12;  // largest amount by which a gap may fall short of 0
+// Smallest slip that must be reported; a million times the rounding of a displacement.
+constexpr double kSlips_m = 1e-9;
+constexpr double kShort_m = 1e-12;  // largest length by which a gap may fall short of 0
 constexpr double beyond_all_m = std::numeric_limits<double>::infinity();
 
-// The least distance f along a segment, by golden-section search; if it is at least `enough`, returns some lower bound
-// that is at least `enough`. Precondition: f is convex and changes by at most the length moved.
+// Returns the least value of the distance f along a segment, by golden-section search. If the least value is at least
+// `enough`, may return a lower bound of it that is at least `enough`. Precondition: f is convex, and changes by at most
+// the length by which its argument moves.
 template <typename Distance>
 double least_along(const Vec3& a, const Vec3& b, Distance f, double enough = beyond_all_m) {
   if (a == b) return f(a);
@@ -64,12 +66,13 @@ double along(const std::vector<Vec3>& points, const Vec3& n, double& highest) {
   return lowest;
 }
 
-// Distance of p from an edge that leads from `from` by d.
+// Returns the distance of p from the edge between `from` and `from` + d.
 double to_edge(const Vec3& from, const Vec3& d, const Vec3& p) {
   return (p - from - std::clamp(d.dot(p - from) / d.squaredNorm(), 0.0, 1.0) * d).norm();
 }
 
-// Distance of p from a triangle, by the regions of its plane (Ericson, Real-Time Collision Detection, 5.1.5).
+// Returns the distance of p from a triangle, by the regions of the triangle's plane. Source: Ericson, Real-Time
+// Collision Detection, 5.1.5.
 double to_triangle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
   const Vec3 ab = b - a, ac = c - a, bc = c - b;
   const Vec3 n = ab.cross(ac);
@@ -78,13 +81,14 @@ double to_triangle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
   return std::min({to_edge(a, ab, p), to_edge(a, ac, p), to_edge(b, bc, p)});
 }
 
-// Whether a contact may belong to an edge: it lies on the edge, and the edge is perpendicular to its normal.
+// Returns whether a contact may be on an edge: the contact's point lies on the edge, and the contact's normal is
+// perpendicular to the edge.
 bool lies_on(const PoseContact& contact, const Vec3& from, const Vec3& to, double within_m) {
   const Vec3 d = to - from;
   return std::abs(contact.normal_W.dot(d)) <= within_m && to_edge(from, d, contact.point_W) <= within_m;
 }
 
-// Compliance of K at a contact along a direction, m/N.
+// Returns the compliance of K at a contact along a direction, m/N.
 double yields(const ToolCall& call, const PoseContact& contact, const Vec3& along) {
   Twist wrench;
   wrench << along, (contact.point_W - call.r.position).cross(along);
@@ -111,7 +115,8 @@ ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene
       for (int k = 0; k < 3; ++k) core.normals_T.emplace_back(Vec3::Unit(k));
       core.edges_T = core.normals_T;
     } else if (const auto* hull = std::get_if<models::ConvexTool>(&part.shape)) {
-      // All planes through three points with all others on one side, and all pairs of points as edges.
+      // The normals are those of all planes through three points that have all other points on one side. Each pair of
+      // points counts as an edge.
       core.corners_T = hull->points_m;
       for (std::size_t i = 0; i < hull->points_m.size(); ++i) {
         for (std::size_t j = i + 1; j < hull->points_m.size(); ++j) {
@@ -182,7 +187,8 @@ ToolLaws::Piece ToolLaws::triangle_of(const models::TriangleMesh& mesh, std::uin
   return piece_of(corners, normals, edges);
 }
 
-// Pairs of corners that are both furthest along two normals, or against them (a box has one normal for two sides).
+// Returns a piece's sharp edges. An edge is a pair of corners that are both furthest along, or against, two of the
+// normals. (A box has one normal for two opposite sides.)
 ToolLaws::Edges ToolLaws::sharp_edges_of(const Piece& piece) {
   std::vector<Vec3> faces;
   const auto is_far = [&](const Vec3& x, const Vec3& n) {
@@ -215,7 +221,8 @@ ToolLaws::Edges ToolLaws::sharp_edges_of(const models::TriangleMesh& mesh) {
   for (std::uint32_t f = 0; f < mesh.size(); ++f) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t from = mesh.triangle(f)[k], to = mesh.triangle(f)[(k + 1) % 3];
-      if (from < to) out.emplace_back(mesh.vertex(from), mesh.vertex(to));  // the other face has it in reverse
+      // The neighbouring face has the same edge reversed.
+      if (from < to) out.emplace_back(mesh.vertex(from), mesh.vertex(to));
     }
   }
   return out;
@@ -230,8 +237,8 @@ ToolLaws::Piece ToolLaws::moved(const Piece& piece, const ToolPose& pose) {
   return out;
 }
 
-// Whether two balls are so far apart that their contents needn't be examined. Lowers the least gap to the balls'
-// distance.
+// Returns whether two balls are so far apart that the pieces inside them needn't be examined. If so, lowers `gap` to
+// the balls' distance, if that is smaller.
 bool ToolLaws::are_clear(const Vec3& a, double a_reach_m, const Vec3& b, double b_reach_m, double& gap) {
   const double clear = (a - b).norm() - a_reach_m - b_reach_m;
   if (!(clear > clear_m || clear >= gap)) return false;
@@ -239,7 +246,8 @@ bool ToolLaws::are_clear(const Vec3& a, double a_reach_m, const Vec3& b, double 
   return true;
 }
 
-// The largest separation over all axes. If some axes already separate the pieces by `enough`, a lower bound.
+// Returns the distance of two pieces, as the largest separation over all axes. If one of the axes already separates the
+// pieces by `enough`, returns a lower bound instead.
 double ToolLaws::between_m(const Piece& a, const Piece& b, double enough) {
   double gap = enough;
   if (are_clear(a.middle, a.reach_m, b.middle, b.reach_m, gap)) return gap;
@@ -261,8 +269,8 @@ double ToolLaws::between_m(const Piece& a, const Piece& b, double enough) {
   return gap;
 }
 
-// Distance of a triangle from a segment with a radius. If balls or one of the triangle's normals separate them by
-// `enough`, a lower bound.
+// Returns the distance of a triangle from a segment with a radius (a capsule). If the balls around them or one of the
+// triangle's normals separate them by `enough`, returns a lower bound instead.
 double ToolLaws::from_segment_m(const Piece& triangle, const Vec3& from, const Vec3& to, double radius, double enough) {
   double gap = enough;
   if (are_clear(triangle.middle, triangle.reach_m, 0.5 * (from + to), 0.5 * (to - from).norm() + radius, gap))
@@ -279,16 +287,17 @@ double ToolLaws::from_segment_m(const Piece& triangle, const Vec3& from, const V
          radius;
 }
 
-// Distance between a mesh, as tool or object, and a shape with a volume. Planes are tested with corners instead.
+// Returns the distance between a mesh and a shape with a volume, one of which is a part of the tool and the other an
+// object. For planes, corners are tested instead.
 double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_t index) const {
   const scenes::Object& object = scene_.objects[index];
   const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape);
   const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape);
   const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape);
   double gap = beyond_all_m;
-  // If one lies entirely inside the other, the depth is the size of the smaller one. All corners must be inside: one
-  // that touches from outside may be on either side by rounding (replay 5924495204300528, step 31: a box whose first
-  // corner is on the tool).
+  // If one shape lies entirely inside the other, the depth is the size of the inner shape. All of its corners must be
+  // inside: a single corner that touches the other shape from outside may lie inside by rounding (replay
+  // 5924495204300528, step 31: a box whose first corner is on the tool).
   const auto all_in = [](const models::TriangleMesh& around, const std::vector<Vec3>& points, const auto& place) {
     return std::all_of(points.begin(), points.end(), [&](const Vec3& x) { return around.encloses(place(x)); });
   };
@@ -349,7 +358,7 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
   if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape)) {
     return least_along(capsule->from_m, capsule->to_m, to_box) - capsule->radius_m;
   }
-  // Between two convex polyhedra, the largest separation over all their axes.
+  // The distance between two convex polyhedra is the largest separation over all their axes.
   const auto& box = std::get<scenes::BoxShape>(object.shape);
   std::vector<Vec3> corners, axes;
   for (const Vec3& x : core.corners_T) corners.emplace_back(pose * x);
@@ -372,7 +381,7 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
   return gap;
 }
 
-// The formula of a script: c + R(ωt)(x − c) + vt + a sin(2πft + φ), with R by Rodrigues' formula.
+// Computes the script's motion of a point x: c + R(ωt)(x − c) + vt + a sin(2πft + φ), with R by Rodrigues' formula.
 models::Pose ToolLaws::place(std::size_t index, double time_s) const {
   models::Pose X = models::Pose::Identity();
   const std::optional<scenes::Motion>& motion = scene_.objects[index].motion;
@@ -410,7 +419,8 @@ std::vector<PoseContact> ToolLaws::carried(std::vector<PoseContact> contacts, do
   return contacts;
 }
 
-// With moving objects also the rounding of a moved pose, which comes from two poses of the object.
+// With moving objects, the rounding includes that of q moved with an object, which follows from two poses of the
+// object.
 double ToolLaws::rounding_of_ways_m(const ToolCall& call) const {
   return (moves_ ? 3.0 : 1.0) * 8.0 * rounding_m(call.r);
 }
@@ -456,29 +466,32 @@ std::string ToolLaws::missed(const ToolCall& call) const {
     sum.tail<3>() += (contact.point_W - call.r.position).cross(contact.force_W);
     size = std::max(size, contact.force_W.norm());
   }
-  // Where contacts press against each other, the local problem is solved to 1e-10 of a step.
+  // If contacts press against each other, 𝒢 solves for their forces to 1e-10 of a step.
   if (!((sum - call.wrench()).norm() <= 1e-9 * size + 16.0 * call.stiffest * rounding_m(call.r))) return "balance";
   for (const PoseContact& contact : call.contacts) {
     const Vec3 &f = contact.force_W, &n = contact.normal_W;
     const double f_n = n.dot(f);
     const Vec3 f_t = f - f_n * n;
     if (!(f_n >= -1e-12 * size)) return "a pull";
-    // A contact on a hollow's wall is less exact, since its normal turns with it.
+    // The gap of a contact on a hollow object's wall is less exact, because the normal turns as the contact point
+    // moves.
     if (std::abs(contact.gap_m) > (hollow_ ? 1e-10 : 1e-12) && f_n > 1e-9 * size) return "a force over a gap";
     const double limit = friction(contact) * f_n;
-    // In hollow objects contacts may press against each other, and their forces are exact to 1e-10 of √(eᵀK e),
-    // converted to a force by the contact's compliance. Elsewhere such an excess over the cone is removed.
+    // In hollow objects contacts may press against each other. Their forces are then exact to 1e-10 of √(eᵀK e), which
+    // the contact's compliance converts to a force. With other objects 𝒢 removes any excess of a force over the
+    // contact's cone.
     double beyond = 1e-11 * size;
     if (hollow_) {
       const Twist e = models::difference(call.r, call.p);
       beyond += 1e-10 * std::sqrt(e.dot(call.K * e) / yields(call, contact, n));
     }
     if (!(f_t.norm() <= limit + beyond)) return "out of the cone";
-    // A slip much smaller than friction's displacement of the contact is nearly sticking, so its direction counts less.
-    // The slip is a difference of two places, exact to ε = 8 roundings (of both poses and of points rotated with them;
-    // up to 5 have occurred). Friction against s₀ = s − e, ‖e‖ ≤ ε, deviates from s by
+    // A contact whose slip is much smaller than the displacement that friction causes at the contact nearly sticks, so
+    // the slip's direction counts less. The slip s is a difference of two places, and is exact to ε = 8 roundings:
+    // those of both poses, and of points rotated with the poses (up to 5 roundings have occurred). Friction that is
+    // against the exact slip s₀ = s − e, with ‖e‖ ≤ ε, deviates from friction against s by
     //   μ f_n ‖s/‖s‖ − s₀/‖s₀‖‖ ≤ 2 μ f_n ε/‖s‖
-    // and so does any friction that sticks, where s₀ = 0 and ‖s‖ ≤ ε.
+    // The same limit holds for a contact that sticks, where s₀ = 0 and ‖s‖ ≤ ε, with any direction of friction.
     const Vec3 slip = call.slip_of(contact);
     const double s = slip.norm();
     if (!(s > 0.0)) continue;
@@ -491,11 +504,12 @@ std::string ToolLaws::missed(const ToolCall& call) const {
   return {};
 }
 
-// The sine of the normal's turn, if that is more than the tool's own turn.
+// Returns by how much a contact's normal turns in the call: the tool's own turn in rad, or the sine of the turn of two
+// crossing edges' normal if that is larger.
 double ToolLaws::normal_turns(const ToolCall& call, const PoseContact& contact) const {
   const ToolPose& q = call.from(contact);
   double most = models::difference(call.r, q).tail<3>().norm();
-  // At either pose a gap may fall short by 1e-12 m.
+  // At each of the two poses a gap may fall short of 0 by 1e-12 m.
   const double within_m = 2e-12 + rounding_of_ways_m(call);
   const Vec3 &n = contact.normal_W, way = call.way_of(contact);
   const auto object = static_cast<std::size_t>(contact.object);
@@ -546,7 +560,7 @@ double ToolLaws::left_J(const ToolCall& call, double rise_J, double short_m) con
   for (const PoseContact& contact : call.contacts) {
     forces_N += contact.force_W.norm();
     const Vec3 y = call.on_tool(contact);
-    rise_J -= contact.force_W.dot(call.from(contact) * y - call.q * y);  // the object's own work
+    rise_J -= contact.force_W.dot(call.from(contact) * y - call.q * y);  // minus the object's own work
   }
   return rise_J - curvature_J(call) - forces_N * slack_m(call, short_m) - 1e-12;
 }
@@ -570,9 +584,10 @@ double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& e
     const auto met = [&](const PoseContact& was) {
       return was.object == contact.object && was.normal_W.dot(way) <= bent_m && cosine_of(was) > 0.0;
     };
-    // A normal turns locally, so of the earlier contacts with this object only those near enough for the point to have
-    // come from are used; if there are none, all are used. (Replay 2305703389568219, step 172: one edge of the tool
-    // moves from a mesh's face to the next face's edge, while other edges already lie on that face elsewhere.)
+    // A normal turns locally. So of the earlier contacts with this object only those are used that are so near that the
+    // contact point may have come from there. If there are none, all earlier contacts with the object are used. (Replay
+    // 2305703389568219, step 172: one edge of the tool moves from a mesh's face to an edge of the next face, while
+    // other edges of the tool already lie elsewhere on that next face.)
     const auto came = [&](const PoseContact& was) {
       return met(was) && (was.point_W - contact.point_W).norm() <= 2.0 * s;
     };

@@ -1,10 +1,11 @@
-// The judge's own copy of the laws of a rigid tool among objects (models/geometry/pose_algorithm.hpp), of distances,
-// and of scripted motion, for the stress study.
+// Judges a rigid tool's steps for the stress study. The laws of a rigid tool among objects
+// (models/geometry/pose_algorithm.hpp), distances, and scripted motion are written here a second time, without the code
+// that is judged.
 //
-// An object that moves by X(t) carries what it touches. With c = X(t) X(t − T)⁻¹, a material point of the tool that was
+// An object that moves by X(t) carries what touches it. Let c = X(t) X(t − T)⁻¹. A material point of the tool that was
 // at y and is at x has moved by x − c y relative to the object. The work of the contact's force on that displacement is
-// judged as if the object stood still: relative to the object, the tool moves from c q to r. The object does the rest
-// of the work, fᵀ(c y − y), which no law limits.
+// judged as if the object stood still and the tool moved from c q to r. The rest of the force's work, fᵀ(c y − y), is
+// done by the object, and no law limits it.
 #pragma once
 
 #include <memory>
@@ -22,20 +23,20 @@ namespace proxarm::studies {
 
 struct ToolCall {
   models::Mat6 K;
-  double stiffest = 0.0;  // K's largest eigenvalue with rotations scaled by lever_m; N/m
+  double stiffest = 0.0;  // K's largest eigenvalue, with rotations scaled to lengths by lever_m; N/m
   models::ToolPose p, q, r;
   std::vector<models::PoseContact> contacts;
   bool unresolved = false;
-  double since_s = 0.0, time_s = 0.0;    // times of the tool at q and at r
-  std::vector<models::ToolPose> with{};  // for each object, q moved with it; empty if nothing moves
+  double since_s = 0.0, time_s = 0.0;    // times at which the tool is at q and at r
+  std::vector<models::ToolPose> with{};  // for each object, q moved with the object; empty if no object moves
 
   [[nodiscard]] const models::ToolPose& from(const models::PoseContact& contact) const {
     return with.empty() ? q : with[static_cast<std::size_t>(contact.object)];
   }
 
   [[nodiscard]] models::Twist wrench() const { return K * models::difference(r, p); }
-  // Displacement since q of the tool's material point at a contact, relative to the object. slip_of() is its tangential
-  // part.
+  // Returns the displacement since q, relative to the object, of the tool's material point at a contact. slip_of()
+  // returns the tangential part of this displacement.
   [[nodiscard]] models::Vec3 way_of(const models::PoseContact& contact) const {
     return contact.point_W - from(contact) * on_tool(contact);
   }
@@ -55,54 +56,66 @@ class ToolLaws {
   // Precondition: the scene outlives the laws.
   ToolLaws(const scenes::Scene& scene, const models::Tool& tool);
 
-  // Depth of the tool inside the objects, m. If negative, the tool is at least that far away from them.
+  // Returns the largest depth of the tool inside an object, m. If negative, the tool is at least that far away from all
+  // objects.
   [[nodiscard]] double depth_m(const models::ToolPose& pose, double time_s = 0.0) const;
 
-  // Sets the call's `with`: q moved with each object.
+  // Sets call.with: for each object, q moved with the object.
   void carry(ToolCall& call) const;
-  // Returns the contacts moved with their objects from since_s to time_s.
+  // Returns the contacts, each moved with its object from since_s to time_s.
   [[nodiscard]] std::vector<models::PoseContact> carried(std::vector<models::PoseContact> contacts, double since_s,
                                                          double time_s) const;
   [[nodiscard]] bool moves() const { return moves_; }
 
-  // Names the law that the call violates; empty if none.
+  // Returns the name of a law that the call violates; empty if there is none.
   [[nodiscard]] std::string missed(const ToolCall& call) const;
 
-  // Energy that the contacts may add to the tool, which is of second order in the step. A point's path bends by θ²
-  // lever/2 if the tool turns by θ; a normal turns by θ while the point moves by s; a round surface falls away by
-  // s²/2r.
+  // Returns a bound of the energy that the contacts may add to the tool. The bound is of second order in the step, and
+  // has three parts:
+  //   - If the tool turns by θ, the path of a point bends by θ² lever/2.
+  //   - The normal turns by θ while the contact point moves by s.
+  //   - A round surface of radius r falls away by s²/2r.
   //
-  // If two sharp edges along a and b cross, the normal is along a × b and turns by up to θ over the sine of the angle
-  // between them. Its turn is known. Let n₀ be the same edges' normal at q, y the contact point and x the place of its
-  // material point at q. Then s = y − x leads from one edge's line to the other's, and −n₀ᵀs was the edges' gap. So
-  // n₀ᵀs ≤ 0 except for rounding, and nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖.
+  // If two sharp edges along a and b cross, the normal n is along a × b. It may turn by up to θ over the sine of the
+  // angle between the edges, but its actual turn α is known, and bounds the energy:
+  //   1. Let n₀ be the normal of the two edges at q, y the contact point, x the place of y's material point at q, and
+  //      s = y − x.
+  //   2. s leads from the line of one edge to the line of the other, and −n₀ᵀs was the gap between the edges. So n₀ᵀs ≤
+  //   0
+  //      except for rounding.
+  //   3. Therefore nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖.
   [[nodiscard]] double curvature_J(const ToolCall& call) const;
-  // How much the gaps at a pose fall short of 0, at most 1e-12 m, the permitted depth. A contact point may lie up to
-  // 1e-10 m beside its feature, and so below the feature's plane without being inside an object.
+  // Returns by how much the gaps at a pose fall short of 0, at most 1e-12 m, which is the permitted depth. Larger
+  // shortfalls don't count: a contact point may lie up to 1e-10 m beside its feature, and so below the feature's plane
+  // without being inside an object.
   [[nodiscard]] static double short_m(double depth_m, const std::vector<models::PoseContact>& contacts);
-  // Energy gain that neither curvature_J() nor rounding explains (J); negative if fully explained. The contacts' forces
-  // push back `short_m`, by which gaps at q fell short. Contacts that press against each other with thousands of
-  // newtons are solved to 1e-10 of the step.
+  // Returns the part of the energy gain `rise_J` that neither curvature_J() nor rounding explains, J; negative if all
+  // of the gain is explained. `short_m`: by how much gaps at q fell short of 0; the contacts' forces push the tool back
+  // by that length. Contacts that press against each other with thousands of newtons are solved to 1e-10 of the step.
   [[nodiscard]] double left_J(const ToolCall& call, double rise_J, double short_m) const;
-  // Work of the normal forces at r on contact points that moved forward along their normals further than turning
-  // normals, curvature and rounding explain (J). The displacements are those of contact points, so the bend of a path
-  // by its lever isn't part of it.
+  // Returns the work of the normal forces at r on contact points that moved forward along their normals, J. Only the
+  // length counts that turning normals, curvature and rounding don't explain. The displacements are those of contact
+  // points, so the bend of a path by its lever doesn't occur in them.
   [[nodiscard]] double pushed_J(const ToolCall& call, double short_m) const;
 
-  // Energy that contacts may add because the tool goes over an edge from one feature of an object to another. There the
-  // normal turns by α at once, from n₀ to n. Along n₀ the contact point reached the feature or was held by it, so n₀ᵀs
-  // ≤ 0 except for curvature, and nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖. Precondition: the step's parts show
-  // that it is an edge (tool_parts.hpp). `earlier`: the contacts of the step before, and those on the path. A normal n₀
-  // isn't used if the point came from behind its feature, nor at a right angle or more to n, where cos α n₀ᵀs ≥ 0
-  // bounds nothing.
+  // Returns a bound of the energy that contacts may add because the tool goes over an edge from one feature of an
+  // object to another. At the edge the normal turns by α at once, from n₀, the normal of the first feature, to n. Let s
+  // be the displacement since q of the material point at the contact.
+  //   1. Along n₀ the contact point reached the first feature or was held by it, so n₀ᵀs ≤ 0 except for curvature.
+  //   2. Therefore nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖.
+  // Precondition: the step's parts show that the tool goes over an edge (tool_parts.hpp). `earlier`: the contacts of
+  // the step before, and the contacts on the path. A normal n₀ isn't used if the contact point came from behind the
+  // first feature. Neither is it used if n₀ is at a right angle or more to n, because then cos α n₀ᵀs ≥ 0 bounds
+  // nothing.
   [[nodiscard]] double edges_J(const ToolCall& call, const std::vector<models::PoseContact>& earlier) const;
 
-  // Rounding of a pose, as a length in m.
+  // Returns the rounding of a pose, as a length in m.
   [[nodiscard]] static double rounding_m(const models::ToolPose& pose);
 
  private:
   using Edges = std::vector<std::pair<models::Vec3, models::Vec3>>;
-  // A convex piece: its corners, and all directions that may separate it from another piece.
+  // A convex piece: its corners, and the directions of its normals and edges, from which all axes follow that may
+  // separate it from another piece.
   struct Piece {
     std::vector<models::Vec3> corners, normals, edges;
     models::Vec3 middle = models::Vec3::Zero();
@@ -114,33 +127,36 @@ class ToolLaws {
   static Edges sharp_edges_of(const Piece& piece);
   static Edges sharp_edges_of(const models::TriangleMesh& mesh);
   static Piece moved(const Piece& piece, const models::ToolPose& pose);
-  static constexpr double clear_m = 1e-3;  // beyond this distance, balls around pieces are precise enough
+  static constexpr double clear_m = 1e-3;  // above this distance, the distance of balls around pieces is precise enough
   static bool are_clear(const models::Vec3& a, double a_reach_m, const models::Vec3& b, double b_reach_m, double& gap);
   static double between_m(const Piece& a, const Piece& b, double enough);
   static double from_segment_m(const Piece& triangle, const models::Vec3& from, const models::Vec3& to, double radius,
                                double enough);
 
-  // All points within radius_m of the convex hull of the corners: one corner for a sphere, two for a capsule.
+  // A part of the tool: all points within radius_m of the convex hull of its corners. A sphere has one corner, and a
+  // capsule has two.
   struct Core {
-    std::vector<Piece> pieces_T;                           // of a part with sharp edges; a mesh's triangles
-    std::shared_ptr<const models::TriangleMesh> mesh_T{};  // of a mesh
+    std::vector<Piece> pieces_T;  // pieces of a part with sharp edges; for a mesh, its triangles
+    std::shared_ptr<const models::TriangleMesh> mesh_T{};  // of a part that is a mesh
     std::vector<models::Vec3> corners_T, normals_T, edges_T;
     Edges sharp_T;
     models::Vec3 middle_T = models::Vec3::Zero();
     models::Pose X_TP = models::Pose::Identity();
-    models::Vec3 half_m = models::Vec3::Zero();  // of a box
+    models::Vec3 half_m = models::Vec3::Zero();  // half the edge lengths of a box
     double radius_m = 0.0, reach_m = 0.0;
     std::optional<double> friction;
   };
 
-  // The object's pose relative to its description; its motion from since_s to time_s.
+  // place() returns an object's pose relative to the object's description; motion() returns the object's motion from
+  // since_s to time_s.
   [[nodiscard]] models::Pose place(std::size_t object, double time_s) const;
   [[nodiscard]] models::Pose motion(std::size_t object, double since_s, double time_s) const;
-  // Rounding of a material point's displacement, m.
+  // Returns the rounding of a material point's displacement, m.
   [[nodiscard]] double rounding_of_ways_m(const ToolCall& call) const;
   [[nodiscard]] double friction(const models::PoseContact& contact) const;
   [[nodiscard]] double normal_turns(const ToolCall& call, const models::PoseContact& contact) const;
-  // How far a contact point may move forward along its normal, as the normal turns and the surface falls away, m.
+  // Returns how far a contact point may move forward along its normal because the normal turns and the surface falls
+  // away, m.
   [[nodiscard]] double forward_m(const ToolCall& call, const models::PoseContact& contact) const;
   [[nodiscard]] double slack_m(const ToolCall& call, double short_m) const;
   [[nodiscard]] double apart_m(const Core& core, const models::ToolPose& pose, const scenes::Object& object) const;
@@ -149,9 +165,9 @@ class ToolLaws {
   const scenes::Scene& scene_;
   bool hollow_ = false, moves_ = false;
   std::vector<Core> cores_;
-  std::vector<std::vector<Piece>> pieces_;  // of each object: a mesh's triangles or a box; empty for others
+  std::vector<std::vector<Piece>> pieces_;  // of each object: a mesh's triangles, or a box; empty for other shapes
   std::vector<Edges> sharp_;                // of each object
-  std::vector<double> bend_per_m_;          // of each object; 1/radius if it is round
+  std::vector<double> bend_per_m_;          // curvature of each object: 1/radius if the object is round
 };
 
 }  // namespace proxarm::studies

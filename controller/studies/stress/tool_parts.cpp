@@ -8,19 +8,20 @@
 namespace proxarm::studies {
 namespace {
 
-// Numbers of parts into which a path is first divided, tried in this order.
+// The numbers of parts into which a path is divided at first. They are tried in this order.
 constexpr std::array kFirst{8, 1, 3, 5, 7, 13, 29};
-constexpr double kLeast = 1e-12;  // least size of a part, as a share of the path or of a wait
+constexpr double kLeast = 1e-12;  // smallest size of a part, as a share of the path or of a wait
 constexpr std::size_t kMost = 400;
-// A contact point may lie this far beside its feature (touch.hpp, beside_m), before and behind an edge.
+// How far a contact point may lie beside its feature, before and behind an edge (touch.hpp, beside_m).
 constexpr double kBeside_m = 1e-10;
-// Displacement from a point, ten times that. Contacts nearer to each other count as at one point.
+// How far a path is displaced from a point. Contacts that are nearer to each other than this count as being at one
+// point.
 constexpr double kAside_m = 10.0 * kBeside_m;
-// Number of directions in which a tool is displaced. In replay 5693172070329278 a fifth of them lead away from its
-// vertex: those out of the object and to the other side.
+// Number of directions in which a tool is displaced. In replay 5693172070329278 a fifth of the directions lead away
+// from the vertex: those that lead out of the object and to the other side.
 constexpr int kAsides = 32;
 
-// Whether several contacts with one object press at one place.
+// Returns whether several contacts with one object press at one place.
 bool lies_on_point(const std::vector<models::PoseContact>& contacts) {
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
@@ -34,7 +35,8 @@ bool lies_on_point(const std::vector<models::PoseContact>& contacts) {
 
 }  // namespace
 
-// The middle between two successive marks: of the path, or of the wait at the second.
+// Returns the middle between two successive marks: on the path, or, if the path can't be divided there, in the wait at
+// the second mark. Returns nullopt if the wait can't be divided either.
 std::optional<ToolParts::Mark> ToolParts::between(const Mark& a, const Mark& b) {
   if (b.share - a.share > kLeast) return Mark{0.5 * (a.share + b.share), 1.0};
   const double waited = a.share == b.share ? a.waited : 0.0;
@@ -42,8 +44,9 @@ std::optional<ToolParts::Mark> ToolParts::between(const Mark& a, const Mark& b) 
   return {};
 }
 
-// Where to divide between two poses: close to the first one, if marks after it found no forces, since a smaller step
-// may find some; if nothing lies between, in the widest gap.
+// Returns where to divide the path between the poses at `from` and `to`; nullopt if it can't be divided. The marks
+// between them found no forces. A smaller step from the first pose may find some, so the gap after `from` is divided.
+// If that gap can't be divided, the widest one of the others is.
 std::optional<ToolParts::Mark> ToolParts::divide(const std::vector<Mark>& marks, const Mark& from, const Mark& to) {
   auto i = std::lower_bound(marks.begin(), marks.end(), from);
   if (const auto first = between(i[0], i[1])) return first;
@@ -88,7 +91,7 @@ void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, Goi
     const models::ToolPose start = from(last, going);
     next.call.p = models::moved(call.q, mark->share * models::difference(call.p, call.q));
     const double since = last.mark.share == mark->share ? last.mark.waited : 0.0, waited = mark->waited;
-    // η = h/(1 + h)
+    // η = h/(1 + h), where h is the difference of τ from `since` to `waited`.
     const double drawn = waited == 1.0 ? 1.0 : (waited - since) / (waited - since + (1.0 - since) * (1.0 - waited));
     if (drawn < 1.0) next.call.p = models::moved(start, drawn * models::difference(next.call.p, start));
     next.call.time_s = time_of(call, *mark);

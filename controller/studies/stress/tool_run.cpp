@@ -25,7 +25,9 @@ using models::Twist;
 using models::Vec3;
 
 constexpr int steps_per_run = 1000;
-constexpr double most_m = 0.05, most_rad = 0.3, furthest_m = 2.0;  // largest step; largest distance from the origin
+// A run ends before a step that is larger than most_m or most_rad, or if the tool is further than furthest_m from the
+// origin.
+constexpr double most_m = 0.05, most_rad = 0.3, furthest_m = 2.0;
 constexpr double lever = ToolLaws::lever_m;
 
 Twist levers() {
@@ -34,7 +36,7 @@ Twist levers() {
   return out;
 }
 
-// A random K: eigenvectors in all directions, eigenvalues (N/m) of 1 to `condition`.
+// Returns a random K whose eigenvectors have any direction, and whose eigenvalues (N/m) are 1 to `condition`.
 Mat6 random_stiffness(Random& random, double condition) {
   Mat6 A;
   for (int i = 0; i < 36; ++i) A.data()[i] = random.uniform(-1.0, 1.0);
@@ -46,7 +48,7 @@ Mat6 random_stiffness(Random& random, double condition) {
   return half * half.transpose();
 }
 
-// A wrench that a hand or a machine might make, with a return to `home`.
+// Makes wrenches as a hand or a machine might make them, with a spring and a damper that lead the tool back to `home`.
 class Pull {
  public:
   Pull(Random& random, const Vec3& towards, const Vec3& home)
@@ -83,7 +85,7 @@ class Pull {
       h.force += size_N_ * noise_ * random_.in_box(1.0);
       h.torque += size_N_ * arm_m_ * noise_ * random_.in_box(1.0);
     }
-    // A spring and a damper with a frequency at which the timestep is stable.
+    // The frequency of the spring and the damper is so low that they are stable at this timestep.
     const double rate = centring_ / config.period_s;
     h.force -= config.mass_kg * rate * (rate * (q - home_) + v);
     h.torque -= config.inertia_kg_m2 * rate * omega;
@@ -98,8 +100,8 @@ class Pull {
   Vec3 force_, torque_, towards_, home_;
 };
 
-// A tool in the middle of a hollow object would touch nothing. (Drawn from its own seed, so that other worlds stay the
-// same.)
+// Returns the place near which the tool is kept. In a hollow object it is off the middle, because a tool in the middle
+// would touch nothing. The place is drawn from a seed of its own, so that other worlds stay the same.
 Vec3 home_in(const std::string& kind, std::uint64_t seed) {
   Random random(seed + 1);
   const double away_m = random.uniform(0.0, 0.15);
@@ -112,14 +114,14 @@ class Judge {
   Judge(const ToolLaws& laws, PoseAlgorithm& g, Random& random, Tally& tally, std::string* report)
       : laws_(laws), g_(g), fresh_(g.clone()), parts_(laws, *fresh_), random_(random), tally_(tally), report_(report) {}
 
-  // `rise_J`: rise of the tool's energy beyond the hand's work.
+  // Judges step k. `rise_J` is the rise of the tool's energy less the hand's work.
   void step(std::int64_t k, bool fault, const ToolCall& call, double rise_J) {
     step_ = k;
     ++tally_.steps;
     if (fault) return note(finite, call, "", 0.0);
     tally_.contact += call.contacts.empty() ? 0 : 1;
     tally_.slipping += std::any_of(call.contacts.begin(), call.contacts.end(), [](const auto& c) { return c.slips; });
-    // Even a step without forces must keep its gaps.
+    // Even in a step without forces the tool must not be inside an object.
     const double depth = laws_.depth_m(call.r, call.time_s);
     tally_.deepest_m = std::max(tally_.deepest_m, depth / (1.0 + call.r.position.norm()));
     if (!(depth <= 1e-12)) note(inside, call, "", depth);
@@ -170,7 +172,7 @@ class Judge {
     }
   }
 
-  // As in tests/models/rigid/stiffness_independence_test.cpp, which explains the tolerances.
+  // Checks Assumption 1 with a random K'. tests/models/rigid/stiffness_independence_test.cpp explains the tolerances.
   void judge_stiffness(const ToolCall& call) {
     Twist w = Twist::Zero();
     double least_slip_m = 1e9;
@@ -193,7 +195,8 @@ class Judge {
     other.since_s = call.since_s;
     other.time_s = call.time_s;
     other.with = call.with;
-    // The world that made the step would find its objects at rest.
+    // With moving objects a fresh world repeats the step, because the world that made the step would find its objects
+    // at rest.
     const std::unique_ptr<PoseAlgorithm> again = laws_.moves() ? fresh_->clone() : nullptr;
     PoseAlgorithm& g = again ? *again : g_;
     g.set_time({.time_s = call.time_s, .period_s = call.time_s - call.since_s});
@@ -207,7 +210,7 @@ class Judge {
     if (g.unresolved()) {
       ++tally_.unresolved;
     } else if (!(off <= std::min(allowed, 1e-10))) {
-      // If two answers obey the laws of the same state, Coulomb's law has several solutions, and 𝒢 isn't at fault.
+      // If both answers obey the laws in this state, Coulomb's law has several solutions, and 𝒢 isn't at fault.
       if (laws_.missed(other).empty() && laws_.depth_m(other.r, other.time_s) <= 1e-12) {
         ++tally_.several;
       } else {
@@ -218,17 +221,17 @@ class Judge {
 
   const ToolLaws& laws_;
   PoseAlgorithm& g_;
-  std::unique_ptr<PoseAlgorithm> fresh_;  // hasn't made a step
+  std::unique_ptr<PoseAlgorithm> fresh_;  // a world that hasn't made a step
   ToolParts parts_;
   Random& random_;
   Tally& tally_;
   std::string* report_;
-  std::vector<PoseContact> before_;  // of the step before
+  std::vector<PoseContact> before_;  // contacts of the step before
   double short_before_m_ = 0.0;
   std::int64_t step_ = 0;
 };
 
-// Finds a pose a millimetre outside all objects; false if none was found by chance.
+// Finds a random pose at least a millimetre outside all objects. Returns false if no try found one.
 bool find_start(Random& random, const ToolLaws& laws, ToolPose& q) {
   for (int k = 0; k < 300; ++k) {
     q.position = random.in_box(0.15);
@@ -242,7 +245,7 @@ bool find_start(Random& random, const ToolLaws& laws, ToolPose& q) {
 
 Tally run_tool_seed(std::uint64_t seed, bool moving, std::string* report) {
   Random random(seed);
-  // Drawn from its own seed, so that the other draws stay the same as before meshes were added.
+  // Drawn from a seed of its own, so that all other draws are as they were before meshes were added.
   const bool meshes = Random(seed + 2).chance(0.2);
   RandomToolScene made = meshes ? random_mesh_tool_scene(random) : random_tool_scene(random);
   if (moving) set_in_motion(random, made.scene);
@@ -274,7 +277,7 @@ Tally run_tool_seed(std::uint64_t seed, bool moving, std::string* report) {
     const double before_J = energy_J();
     const models::Wrench h = pull(k, proxy);
     call.p = proxy.predict(h);
-    // A session's limits would have ended such a motion.
+    // The limits of a session would have stopped such a motion.
     const Twist way = models::difference(call.p, call.q);
     if (way.head<3>().norm() > most_m || way.tail<3>().norm() > most_rad || call.q.position.norm() > furthest_m) break;
     call.since_s = proxy.time_s();

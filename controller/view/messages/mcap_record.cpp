@@ -30,7 +30,7 @@ void McapRecord::write(Topic topic, const Moment& moment) {
               messages_.message(topic, moment, links_, objects_));
 }
 
-// Writes a message if there are contacts, and one after the last contact.
+// Writes a message if there are contacts, and one more message after the last contact.
 void McapRecord::write_contacts(Topic topic, const Moment& moment, bool& told) {
   const bool some = moment.record.recorded_contacts() > 0;
   if (some || told) write(topic, moment);

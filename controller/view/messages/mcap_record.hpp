@@ -1,5 +1,6 @@
-// Writes session.mcap of a record: forces and joints of every cycle, contacts if there are any, poses and transforms of
-// every tenth cycle, and the scene when something moves. Written during the session, outside the cycle.
+// Writes session.mcap of a record: forces and joints in every cycle, contacts in cycles that have any, poses and
+// transforms in every tenth cycle, and the scene when something moves. The file is written during the session, outside
+// the cycle.
 #pragma once
 
 #include <array>
@@ -17,12 +18,12 @@ class McapRecord {
   // Precondition: `stage` outlives this object. Throws SetupError.
   McapRecord(const std::filesystem::path& file, Stage& stage);
 
-  // Adds a cycle as in the record's signals: with its distances, and in simulation with the true state.
+  // Adds a completed cycle: with its distances, and in simulation with the true state, as in the record's signals.
   void add(const controller::CycleRecord& completed) { waiting_.push_back(completed); }
-  // Writes the cycles added since the last call, with the changes from the box. Cycles that the box has lost are left
-  // out.
+  // Writes the cycles that were added since the last call, and takes the changes of these cycles from the box. Cycles
+  // that the box has lost are left out.
   void drain(const controller::BoxReader& box);
-  void finish();  // throws SetupError
+  void finish();  // throws SetupError if the file couldn't be written completely
 
  private:
   void write(const controller::BoxCycle& cycle);
@@ -35,9 +36,9 @@ class McapRecord {
   std::array<std::uint16_t, topic_count> channels_{};
   MomentBuilder builder_;
   std::vector<models::Pose> links_, objects_, drawn_;
-  std::deque<controller::CycleRecord> waiting_;  // until the box has the whole cycle
+  std::deque<controller::CycleRecord> waiting_;  // cycles that wait until the box has them completely
   std::uint64_t cycles_ = 0;
-  bool told_contacts_ = false, told_arrows_ = false;  // the last message lists some
+  bool told_contacts_ = false, told_arrows_ = false;  // whether the last message listed contacts
   controller::BoxCycle cycle_;
 };
 

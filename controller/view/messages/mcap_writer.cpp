@@ -28,7 +28,7 @@ enum class Op : std::uint8_t {
   data_end = 0x0F,
 };
 
-// A record's content, field by field.
+// The content of a record, written field by field.
 class Content {
  public:
   template <typename Number>

@@ -1,4 +1,4 @@
-// The messages of each topic, as JSON Schemas. Those whose title begins with foxglove are Foxglove's own.
+// The messages of each topic, as JSON Schemas. Schemas whose title begins with foxglove are Foxglove's own.
 #include <array>
 #include <utility>
 
@@ -7,7 +7,8 @@
 namespace proxarm::view {
 namespace {
 
-// Types that several schemas share. Each text replaces its @name. A type may contain types above it.
+// Types that several schemas share. The text of a type replaces @name in schemas. A text may contain the types above it
+// in this list.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 9> shared_types{{
     {"@text", R"({"type": "string"})"},
     {"@number", R"({"type": "number"})"},
@@ -190,7 +191,8 @@ constexpr std::string_view session_schema = R"({
   }
 })";
 
-// From the last to the first, since a type may contain those above it.
+// Returns the schema with all types replaced. Goes from the last type to the first, since a type may contain types
+// above it.
 std::string whole(std::string_view schema) {
   std::string text(schema);
   for (auto type = shared_types.rbegin(); type != shared_types.rend(); ++type) {

@@ -52,14 +52,15 @@ Pose at(const Vec3& p) {
   return X;
 }
 
-// The smallest rotation from z to a direction, by the half-way vector; for −z it is about x.
+// Returns the smallest rotation from z to `direction`, by the half-way vector. For the direction −z, the rotation is
+// about x.
 Eigen::Quaterniond turn_from_z(const Vec3& direction) {
   const Vec3 d = direction.normalized();
   if (d.z() < -1.0 + 1e-12) return {0.0, 1.0, 0.0, 0.0};  // nearer to −z, rounding would dominate the sum
   return Eigen::Quaterniond(1.0 + d.z(), -d.y(), d.x(), 0.0).normalized();
 }
 
-// A pose between two points, with its z axis from one to the other.
+// Returns the pose half-way between two points, with its z axis from the first point to the second.
 Pose between(const Vec3& from, const Vec3& to) {
   Pose X = at(0.5 * (from + to));
   X.linear() = turn_from_z(to - from).toRotationMatrix();
@@ -77,7 +78,7 @@ class Entity {
   }
   void set_colour(const Colour& colour) { colour_ = colour; }
 
-  // The arrow points along x of its pose.
+  // `X` is the pose of the arrow's tail; the arrow points along x.
   void add_arrow(const Pose& X, double length_m, double thickness_m) {
     const double head_m = std::min(3.0 * thickness_m, length_m);
     begin_shape(arrows_, X);
@@ -111,7 +112,7 @@ class Entity {
     triangles_.end();
   }
 
-  // Writes what was added, and clears it.
+  // Writes the shapes that were added, and clears them.
   void put_into(JsonText& json, const std::string& id, const std::string& frame, std::int64_t time_ns) {
     put_time(json.begin_object().name("timestamp"), time_ns);
     json.add("frame_id", frame).add("id", id);
@@ -204,7 +205,7 @@ std::string wrench_message(const controller::CycleRecord& record) {
   return json.end().take();
 }
 
-// The object's name, by its index in the scene; empty if there is none.
+// Returns the object's name, by the object's index in the scene; empty if there is no such object.
 std::string object_name(const Stage& stage, std::int32_t object) {
   const auto index = static_cast<std::size_t>(object);
   return object >= 0 && index < stage.scene().objects.size() ? stage.scene().objects[index].name : std::string();

@@ -1,5 +1,5 @@
-// A session as JSON messages for other tools: Foxglove's schemas for poses, transforms and the scene, our own for
-// forces, contacts, joints and the session's state.
+// A session as JSON messages for other tools. Poses, transforms and the scene have Foxglove's schemas; forces,
+// contacts, joints and the session's state have our own schemas.
 //
 //   /tool, /proxy      foxglove.PoseInFrame       poses in W
 //   /wrench            proxarm.Wrench             the hand's, in W
@@ -47,7 +47,7 @@ class SessionMessages {
   // Precondition: `stage` outlives this object.
   explicit SessionMessages(const Stage& stage) : stage_(stage) {}
 
-  // A topic's message about a moment. `links`, `objects`: as from Stage::place().
+  // Returns a topic's message about a moment. `links` and `objects` are as from Stage::place().
   [[nodiscard]] std::string message(Topic topic, const Moment& moment, std::span<const models::Pose> links,
                                     std::span<const models::Pose> objects) const;
 

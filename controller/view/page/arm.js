@@ -1,4 +1,4 @@
-// The arm as its URDF draws it, and the handle behind the sensor.
+// The arm as the URDF draws it, and the handle behind the sensor.
 import * as THREE from './three/build/three.module.js';
 import { capsuleGeometry, cylinderGeometry, fetchMesh, hullGeometry, setPose, vec } from './shapes.js';
 import { colour, onTheme } from './theme.js';
@@ -9,7 +9,7 @@ export class ArmView extends THREE.Group {
   constructor(stage) {
     super();
     this.name = 'arm';
-    // Faces a little behind, so that their edges are seen whole.
+    // Faces are drawn a little behind their depth, so that their edges are seen whole.
     const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
     this.materials = [new THREE.MeshLambertMaterial(behind), new THREE.MeshLambertMaterial(behind)];
     this.handleMaterial = new THREE.MeshLambertMaterial();
@@ -36,7 +36,7 @@ export class ArmView extends THREE.Group {
     return group;
   }
 
-  // Boxes are the arms, round things the joints: two tones make the joints readable.
+  // Boxes get the tone of the arms, round shapes the tone of the joints. Two tones make the joints visible.
   addShape(group, shape, index) {
     const material = shape.colour
       ? new THREE.MeshLambertMaterial({ color: new THREE.Color(...shape.colour) })
@@ -46,7 +46,7 @@ export class ArmView extends THREE.Group {
         const mesh = new THREE.Mesh(geometry, material);
         setPose(mesh, shape.pose);
         group.add(mesh);
-      }).catch(() => {});  // what can't be had leaves a gap
+      }).catch(() => {});  // a mesh that can't be fetched leaves a gap
       return;
     }
     group.add(this.makeSolid(shape, material));
@@ -65,7 +65,8 @@ export class ArmView extends THREE.Group {
     return mesh;
   }
 
-  // From the sensor to the rendered point, and a little beyond: what the hand holds. With a rigid tool its shape, too.
+  // Draws what the hand holds: the sensor, and the handle from the sensor to a little beyond the rendered point. Draws
+  // the shape of a rigid tool, too.
   addHandle(tool) {
     const link = this.links[tool.link];
     if (!link) return;

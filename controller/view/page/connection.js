@@ -1,12 +1,12 @@
-// The WebSocket to the process that serves this page, and what comes through it in numbers.
+// The WebSocket to the process that serves this page.
 //
-// Text is JSON with one key, handed on by its name. Binary is a moment or a history, laid out as "stage" says:
-// controller/view/stage/moment.hpp has the wire.
+// A text message is JSON with one key; the handler with the key's name gets its value. A binary message is a moment or
+// a history. Its layout follows from the message "stage"; controller/view/stage/moment.hpp describes it.
 
 const KIND_MOMENT = 1, KIND_HISTORY = 2;
 const POSE_FLOATS = 7;
 
-// Of a controller; before it there is no proxy yet, and the sensor isn't tared.
+// The controller's phase of rendering. In the phases before it, there is no proxy yet, and the sensor isn't tared.
 export const PHASE_RENDERING = 3;
 
 export class Connection {
@@ -30,7 +30,7 @@ export class Connection {
     };
   }
 
-  // A line for the session's control socket; resolves to its answer, "ok: …" or "refused: …".
+  // Sends a line for the session's control socket. Resolves to the session's answer, "ok: …" or "refused: …".
   ask(line) {
     const id = ++this.lastId;
     return new Promise((answered) => {
@@ -40,7 +40,7 @@ export class Connection {
     });
   }
 
-  // For records: {at: CYCLE} and the like.
+  // Sends a request about a record, such as {at: CYCLE}.
   want(request) {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(request));
   }
@@ -87,14 +87,14 @@ export class Connection {
     return moment;
   }
 
-  // The places where something presses, those that are recorded.
+  // Returns the recorded contacts.
   touches(numbers, count) {
     const fields = this.contactFields;
     return Array.from({ length: count }, (_, i) => this.named(numbers, i * fields.length, fields));
   }
 }
 
-// The vector that three fields are: vector(moment, 'proxy').
+// Returns a vector from its three fields: vector(moment, 'proxy').
 export function vector(moment, name) {
   return [moment[`${name}_x`], moment[`${name}_y`], moment[`${name}_z`]];
 }

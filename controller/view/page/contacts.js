@@ -1,25 +1,29 @@
-// Proxy and tool as two things, what they have behind them, and the forces on them: the hand's at the handle, the
-// world's at each place where something presses, with its normal and friction cone.
+// Draws proxy and tool as two things, the leash between them, the proxy's trail, and the forces on them. The hand's
+// force is drawn at the handle. The world's forces are drawn at each contact, with the contact's normal and friction
+// cone.
 import * as THREE from './three/build/three.module.js';
 import { UP, Arrow } from './shapes.js';
 import { colour, onTheme } from './theme.js';
 import { PHASE_RENDERING, vector } from './connection.js';
 import { newtons } from './panel.js';
 
-// At a distance of one metre; from further away everything here is drawn larger, so that it keeps its size in the picture.
+// Scale of the arrows at a camera distance of one metre. From further away, everything here is drawn larger, so that it
+// keeps its size in the picture.
 const METRES_PER_NEWTON = 0.0075;
-// Longer arrows are cut: in the overview, whose height is 0.69 of its distance, this is 44 % of the height.
+// Arrows of larger forces are cut. In the overview, whose height is 0.69 of the camera's distance, this is 44 % of the
+// height.
 const MOST_N = 40;
 const CONE_HEIGHT = 0.1;
 const TRAIL_POINTS = 360;
-const LEAST_N = 0.005;  // what two decimals say of a force
-const LEAST_NS = 0.005, BLOW_S = 1;  // smaller impulses aren't told; for how long one is
+const LEAST_N = 0.005;  // smaller forces are 0 in two decimals
+// Impulses below LEAST_NS aren't shown. An impulse is shown for BLOW_S.
+const LEAST_NS = 0.005, BLOW_S = 1;
 const FREE = 0;
 
 const at = (moment, name) => new THREE.Vector3(...vector(moment, name));
 const newtonsOf = (touch) => Math.hypot(...vector(touch, 'force'));
 
-// Where the proxy has been in the last seconds: plain in free motion, in colour along what it touched.
+// The proxy's way in the last seconds: grey in free motion, coloured by the state of the contact.
 class Trail extends THREE.Line {
   constructor() {
     const geometry = new THREE.BufferGeometry();
@@ -51,7 +55,7 @@ class Trail extends THREE.Line {
 }
 
 export class ContactView extends THREE.Group {
-  // `proxy`: whether there is one, or the arm alone.
+  // `proxy`: whether there is a proxy; false for the arm alone.
   constructor(proxy = true) {
     super();
     this.name = 'contacts';
@@ -60,7 +64,7 @@ export class ContactView extends THREE.Group {
     this.makeMaterials();
     this.proxy = new THREE.Mesh(new THREE.SphereBufferGeometry(0.0105, 32, 20), this.materials.proxy);
     this.proxy.name = 'proxy';
-    // The tool is a ring with a cross in it, so that the proxy is seen inside of it.
+    // The tool is drawn as crossed rings, so that the proxy is visible inside them.
     this.tool = new THREE.Group();
     this.tool.name = 'tool';
     for (const turn of [[0, 0], [Math.PI / 2, 0], [0, Math.PI / 2]]) {
@@ -105,7 +109,8 @@ export class ContactView extends THREE.Group {
     });
   }
 
-  // What is drawn at the place of a contact; `end` tells those of several apart by their names.
+  // Makes the objects that are drawn at a contact. `end` is appended to their names, which distinguishes several
+  // contacts.
   makeMark(end) {
     const mark = {
       normal: new Arrow(this.materials.normal, { radius: 0.0014 }),
@@ -121,7 +126,8 @@ export class ContactView extends THREE.Group {
     return mark;
   }
 
-  // Of height 1 and radius 1 about z, its tip at the contact; scaled by the coefficient of friction.
+  // Makes a friction cone of height 1 and radius 1 about z, with its tip at the contact. It is later scaled by the
+  // coefficient of friction.
   makeCone() {
     const cone = new THREE.Group();
     const sides = 36;
@@ -140,7 +146,7 @@ export class ContactView extends THREE.Group {
     return cone;
   }
 
-  // One mark for each contact; those that aren't wanted now are hidden.
+  // Shows one mark for each contact, and hides the other marks.
   showMarks(touches) {
     while (this.marks.length < touches.length) {
       this.marks.push(this.makeMark(this.marks.length ? `_${this.marks.length + 1}` : ''));
@@ -166,12 +172,12 @@ export class ContactView extends THREE.Group {
     cone.scale.set(radius, radius, height);
   }
 
-  // Where forces act: at the proxy, or at the tool while there is none.
+  // Returns the point at which forces act: the proxy, or the tool while there is no proxy.
   proxyOf(moment) {
     return at(moment, this.withProxy && moment.phase >= PHASE_RENDERING ? 'proxy' : 'tool');
   }
 
-  // `moves`: it is another moment, not the same seen from elsewhere.
+  // `moves`: whether this is another moment; false: the same moment from another camera position.
   show(moment, moves = true) {
     const there = this.withProxy && moment.phase >= PHASE_RENDERING;
     const tool = at(moment, 'tool'), proxy = this.proxyOf(moment);
@@ -180,7 +186,7 @@ export class ContactView extends THREE.Group {
     this.tool.position.copy(tool);
     this.leash.geometry.setFromPoints([proxy, tool]);
     if (moves) {
-      // What was between two places of a record that lie apart isn't known.
+      // If two moments of a record lie apart, the way between them isn't known.
       if (Math.abs(moment.time_s - this.trail.time) > 0.3 || moment.time_s < this.trail.time) this.trail.clear();
       if (!there) this.trail.clear();
       this.trail.time = moment.time_s;
@@ -188,12 +194,13 @@ export class ContactView extends THREE.Group {
     }
 
     const hand = this.arrowOf(moment, 'force');
-    // The hand's arrow ends where it pushes, the world's begin where it presses.
+    // The hand's arrow ends at the proxy, the world's arrows begin at the contacts.
     this.hand.setTo(proxy.clone().sub(hand), hand, moment.hand_N > MOST_N);
     this.showMarks(moment.contact === FREE ? [] : moment.touches);
   }
 
-  // By the camera's distance from the tool. True: it has changed enough to be drawn anew.
+  // Adapts the sizes to the camera's distance from the tool. Returns whether the sizes have changed, so that everything
+  // must be drawn anew.
   setDistance(distance) {
     const size = Math.min(3, Math.max(0.35, distance));
     if (Math.abs(size / this.size - 1) < 0.02) return false;
@@ -203,24 +210,25 @@ export class ContactView extends THREE.Group {
     return true;
   }
 
-  // A force as metres in the picture, at most MOST_N of it.
+  // Returns the arrow of a force in metres, cut at MOST_N.
   arrowOf(moment, name) {
     return at(moment, name).clampLength(0, MOST_N).multiplyScalar(METRES_PER_NEWTON * this.size);
   }
 
-  // What is written beside the arrows. `told`: the moment that the numbers are of. Labels that yield come last: they are
-  // left out where they would lie over others.
+  // Returns the labels beside the arrows. `told`: the moment from which the labels' numbers come. Labels that yield
+  // come last: such a label is left out if it would lie over another label.
   labels(moment, told) {
     const proxy = this.proxyOf(moment), out = [];
     const text = (force_N) => newtons(force_N) + (force_N > MOST_N ? ', arrow cut' : '');
-    // Of a contact that is gone by now no number is told, nor of one that doesn't press.
+    // No label is shown for a contact that is already gone, nor for a contact that doesn't press.
     told.touches.slice(0, moment.touches.length).forEach((touch, i) => {
       if (newtonsOf(touch) < LEAST_N) return;
       const place = moment.touches[i];
       out.push({ name: `contact ${i}`, at: at(place, 'point').add(this.arrowOf(place, 'force')), text: text(newtonsOf(touch)),
                  colour: touch.slips ? '--slip' : '--stick', beside: [-78, -40], yields: i > 0 });
     });
-    // A blow is over before it can be read, and its force in newtons is the timestep's: for a moment its impulse stands.
+    // A blow is over before its force could be read, and the force depends on the timestep. So the blow's impulse is
+    // shown for a moment instead.
     if (told.blow_Ns >= LEAST_NS && told.time_s - told.blow_s < BLOW_S && moment.touches.length) {
       out.push({ name: 'blow', at: at(moment.touches[0], 'point'), text: `impact ${told.blow_Ns.toPrecision(2)} Ns`,
                  colour: '--soft', beside: [18, -34], yields: true });

@@ -1,10 +1,10 @@
-// Changes to a running session, where it was started with --view-control: lines as `proxarm set` and `proxarm hold` send
-// them, and the session's own answers, each beside what it answers.
+// Controls of a running session, if it was started with --view-control. They send lines as `proxarm set` and `proxarm
+// hold` do, and show the session's answer beside the control.
 
 const element = (id) => document.getElementById(id);
 
-// Label, meaning, line, the phases in which it can be given, and why not in others (CycleStatus::refusal has the last
-// word: it knows causes that last and the enabling input as well).
+// For each order: label, meaning, line, the phases in which it is possible, and the reason why it isn't possible in
+// other phases. (CycleStatus::refusal decides; it also knows lasting causes and the enabling input.)
 const ORDERS = [
   ['hold', 'stop the arm, its drives enabled', 'hold', ['rendering', 'freeing'], 'the arm isn’t moving'],
   ['resume', 'go on out of a hold', 'resume', ['holding'], 'the arm isn’t in a hold'],
@@ -15,7 +15,8 @@ const ORDERS = [
 
 const number = (value) => String(Number(value.toPrecision(9)));
 
-// `of`: what the session is set to. Sliders of masses and stiffnesses are logarithmic: a step is a share.
+// Returns the parameters that can be set. `of` returns the present value from the session's settings. `log`: the slider
+// is logarithmic, so that each step is the same share of the value.
 function parametersOf(stage) {
   const all = [
     { name: 'mass', label: 'mass felt', unit: 'kg', low: 0.5, high: 50, log: true, of: (s) => number(s.mass_kg) },
@@ -39,7 +40,8 @@ function parametersOf(stage) {
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
 const BEFORE_UNIT = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s+([^\d\s.,+-]\S*)$/i;
 
-// A number alone is in the field's unit; with a unit, or anything else, the session judges it as it was typed.
+// Returns the value to send. A number alone gets the field's unit. Anything else is sent as typed, and the session
+// judges it.
 function valueOf(parameter, typed) {
   if (parameter.vector) return typed.replace(/\s*,\s*/g, ',');
   return NUMBER.test(typed) ? typed + parameter.unit : typed.replace(BEFORE_UNIT, '$1$2');
@@ -47,7 +49,7 @@ function valueOf(parameter, typed) {
 
 const OVER = 'refused: the session is over';
 
-const SETTLED_MS = 3000;  // after a change was taken, until what the session says of itself counts again
+const SETTLED_MS = 3000;  // after a change was taken, the field shows the session's own value only after this time
 
 const STEPS = 1000;
 const toSlider = (p, value) =>
@@ -77,14 +79,15 @@ export class Control {
     element('parameters').replaceChildren(...this.fields.map((field) => field.box));
   }
 
-  // What the session is set to now, whoever changed it.
+  // Takes the session's present settings, whoever changed them.
   follow(settings) {
     const before = this.settings;
     this.settings = settings;
     for (const { parameter, show } of this.fields) if (parameter.of(settings) !== parameter.of(before)) show();
   }
 
-  // What can't be ordered now is disabled, and why stands below, once for all that have the same reason.
+  // Disables the orders that aren't possible now. Shows the reasons below, each reason once with all orders that it
+  // concerns.
   show({ phase }) {
     const now = this.phases[phase];
     if (this.over || now === this.phase) return;
@@ -99,7 +102,7 @@ export class Control {
     element('not-now').textContent = [...reasons].map(([reason, labels]) => `${labels.join(', ')}: ${reason}`).join('; ');
   }
 
-  // After the session nothing can be changed.
+  // Disables everything, since nothing can be changed after the session.
   end() {
     this.over = true;
     element('not-now').textContent = '';
@@ -107,7 +110,8 @@ export class Control {
     for (const input of element('control').querySelectorAll('button, input')) input.disabled = true;
   }
 
-  // `beside`: the output that takes the answer; a refusal is brought into view.
+  // Sends a line. The answer goes to the output `beside`; a refusal is scrolled into view. Returns whether the line was
+  // accepted.
   async ask(line, beside = element('answer')) {
     const answer = this.over ? OVER : await this.connection.ask(line);
     const refused = !answer.startsWith('ok: ');
@@ -117,7 +121,7 @@ export class Control {
     return !refused;
   }
 
-  // A field with its slider: show() has them say what is, but for one that somebody is changing.
+  // Makes a field with its slider. show() sets both to the present value, except while the user is changing it.
   makeField(parameter) {
     const box = document.createElement('div'), row = document.createElement('div');
     box.className = 'parameter';
@@ -146,8 +150,8 @@ export class Control {
       const taken = await this.ask(`${parameter.name}=${valueOf(parameter, field.value.trim())}`, answer);
       changing = sending = false;
       field.setAttribute('aria-invalid', String(!taken));
-      // What is taken holds from one of the next cycles on. What is refused goes back to what is, and the reason, which
-      // names what was wanted, stays until the next change.
+      // An accepted value is in force from one of the next cycles on. After a refusal, the field goes back to the
+      // present value, and the answer, which names the refused value, stays until the next change.
       const told = answer.textContent;
       if (!taken) return show();
       setTimeout(() => {

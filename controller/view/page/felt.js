@@ -1,15 +1,17 @@
-// Felt against meant, of the time that the plots show: the hand's force against the tool's acceleration in free motion,
-// beside that of the mass that was asked for; and the force of contact against how deep the tool is, beside what the
-// scene means there. The ground is what hands don't tell apart (docs/view.md has the sources).
+// Two diagrams of what the hand felt and what was meant, over the time that the plots show. First, in free motion: the
+// hand's force over the tool's acceleration, and the line of the wanted mass. Second, in contact: the contact force
+// over the tool's depth, and the line that the scene means. The shaded ground is the range that hands can't tell from
+// the line (docs/view.md has the sources).
 import { PHASE_RENDERING, vector } from './connection.js';
 import { colour, dash, onTheme } from './theme.js';
 
-export const NOTICEABLE = 0.1;       // of a force
-const RIGID_N_PER_MM = 42;           // what is stiffer is taken for rigid
-const BLOW_S = 0.05, GAP_S = 0.1;    // of a touch, what isn't in its work; rows that don't follow each other
-const LEAST_M_PER_S2 = 0.05;         // below, it is the encoders' noise
-const CYCLE_BAND = 0.15;             // of a cycle's depth, by which it has to pass its middle on both sides
-const LEAST_CYCLE_MM = 1e-3;         // less deep, it is the encoders' noise
+export const NOTICEABLE = 0.1;  // smallest share of a force that a hand notices
+const RIGID_N_PER_MM = 42;  // a stiffer object feels rigid
+// BLOW_S: beginning of a touch, which doesn't count. GAP_S: longest time between two rows that follow each other.
+const BLOW_S = 0.05, GAP_S = 0.1;
+const LEAST_M_PER_S2 = 0.05;  // smaller accelerations are noise of the encoders
+const CYCLE_BAND = 0.15;  // share of a cycle's depth by which the cycle must pass its middle on both sides
+const LEAST_CYCLE_MM = 1e-3;  // smaller cycles are noise of the encoders
 const BETWEEN_MS = 250;
 const LEFT = 30, BOTTOM = 16, TOP = 18, RIGHT = 6;
 const FONT = '10px system-ui, "DejaVu Sans", sans-serif';
@@ -17,14 +19,15 @@ const FONT = '10px system-ui, "DejaVu Sans", sans-serif';
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const following = (a, b) => b.time_s > a.time_s && b.time_s - a.time_s < GAP_S;
 
-// The hand's force over nine rows, weighted as the second difference of places four rows apart weighs accelerations: by
-// a triangle. So neither is smoother than the other, and their ratio is the mass at any frequency.
+// Returns the hand's force over nine rows, with triangular weights. The second difference of positions four rows apart
+// averages the acceleration with the same weights. So force and acceleration are smoothed equally, and their ratio is
+// the mass at any frequency.
 const TRIANGLE = [0, 1, 2, 3, 4, 3, 2, 1, 0].map((weight) => weight / 16);
 export function evenForce(rows) {
   return ['force_x', 'force_y', 'force_z'].map((part) => rows.reduce((sum, row, i) => sum + TRIANGLE[i] * row[part], 0));
 }
 
-// Force along the acceleration against its size, over nine rows.
+// Returns points [size of the acceleration, force along the acceleration], each over nine rows in free motion.
 export function freePoints(rows) {
   const points = [];
   for (let i = 8; i < rows.length; ++i) {
@@ -36,16 +39,17 @@ export function freePoints(rows) {
     const acceleration = p.map((_, k) => (2 * ((r[k] - q[k]) / h2 - (q[k] - p[k]) / h1)) / (h1 + h2));
     const size = Math.hypot(...acceleration);
     if (!(size > LEAST_M_PER_S2)) continue;
-    const handle_N = rows[i].handle_kg * size;  // of the hand's force, what the sensor behind the handle doesn't see
+    const handle_N = rows[i].handle_kg * size;  // the force that moves the handle, which the sensor behind the handle doesn't see
     const force = evenForce(rows.slice(i - 8, i + 1));
     points.push([size, dot(force, acceleration) / size + handle_N]);
   }
   return points;
 }
 
-// Of each row in touch: depth in mm, force in N; of the last touch the same; and what it took of the hand's energy along
-// that way, in mJ: nothing of a wall or a spring, more than nothing of what damps, less of what swings.
-// `surface_m`: where depth begins, a layer's thickness above what is rigid.
+// Returns for rows in contact: `points` [depth in mm, force in N]; `last`, the points of the last touch; `work`, the
+// energy in mJ that the last touch took from the hand along the normal. `work` is 0 for a wall or a spring, above 0 if
+// the touch damps, and below 0 if the touch gives energy. `surface_m`: where depth begins, a layer's thickness above
+// the rigid surface.
 export function touchPoints(rows, surface_m = 0) {
   const points = [];
   let work = NaN, before = null, begun = 0, last = [];
@@ -69,13 +73,14 @@ export function touchPoints(rows, surface_m = 0) {
   return { points, work, last };
 }
 
-// The last cycle of a touch that goes in and out: from one time at which it is half-way in to the next, so the loop of force
-// over depth is closed. `energy_mJ`, ∮ F dx, is what it takes of the hand; below 0: gives. Null: it made no cycle.
+// Returns the last in-and-out cycle of a touch: from the time when the tool is half-way in to the next such time, so
+// that the loop of force over depth is closed. `energy_mJ`, ∮ F dx, is the energy that the cycle takes from the hand;
+// below 0, the cycle gives energy. Returns null if there was no whole cycle.
 export function cycleOf(points) {
   const depths = points.map(([depth]) => depth), low = Math.min(...depths), high = Math.max(...depths);
   const half = 0.5 * (low + high), band = CYCLE_BAND * (high - low);
   if (!(high - low > LEAST_CYCLE_MM)) return null;
-  const passes = [];  // {at, force}: between `at` and the point after it
+  const passes = [];  // {at, force}: the pass is between the points `at` and `at` + 1
   let out = false, pass = null;
   for (let i = 0; i + 1 < points.length; ++i) {
     const [d0, f0] = points[i], [d1, f1] = points[i + 1];
@@ -101,7 +106,8 @@ class Scatter {
     this.context = canvas.getContext('2d');
   }
 
-  // `meant(x)`: the force that is meant, and its ground from `low(x)` to `high(x)`; null: none. `wide`: x at the right.
+  // Draws one diagram. `line`: the force that is meant. `ground`: the polygon that hands can't tell from the line.
+  // `from`, `wide`: x at the left and at the right. `most`: y at the top. `loop`: a closed loop.
   draw(title, unit, points, { wide, most, line, ground, from = 0, loop = [] }) {
     const c = this.context, { clientWidth: width, clientHeight: height } = this.canvas;
     const ratio = Math.min(2, devicePixelRatio || 1);
@@ -146,7 +152,7 @@ class Scatter {
     const widest = `${Number(wide.toPrecision(2))} ${unit}`, least = `${Number(from.toPrecision(2))}`.replace('-', '−');
     c.fillText(widest, width - RIGHT, height - 7);
     c.textAlign = 'left';
-    // Where there isn't room for both, the unit goes first.
+    // If there isn't room for both numbers, the left one is left out.
     if (c.measureText(widest).width + c.measureText(least).width + 4 < width - RIGHT - LEFT) c.fillText(least, LEFT, height - 7);
   }
 }
@@ -178,7 +184,7 @@ export class Felt {
     this.words.textContent = this.sentence(last.mass_kg, work);
   }
 
-  // Mass by the least squares of force over acceleration.
+  // Returns the felt mass: least squares of force over acceleration.
   get felt_kg() {
     const [fa, aa] = this.points.reduce(([s, t], [a, f]) => [s + f * a, t + a * a], [0, 0]);
     return this.points.length > 20 ? fa / aa : NaN;
@@ -207,7 +213,7 @@ export class Felt {
       ground: [[0, 0], [wide, (1 + NOTICEABLE) * meant], [wide, (1 - NOTICEABLE) * meant]] });
   }
 
-  // A rigid object holds at its surface, and whatever is steep enough feels so; a layer is a spring.
+  // A rigid object stops the tool at its surface, and any steep enough line feels rigid. A layer is a spring.
   drawTouch(points, layer_N_per_m) {
     const most = highest(points, 1, 1), rigid = !(layer_N_per_m > 0), k = rigid ? RIGID_N_PER_MM : 1e-3 * layer_N_per_m;
     const wide = Math.max(highest(points, 0, 0.01), (rigid ? 1.2 : 1) * (most / k)), from = -0.15 * wide;

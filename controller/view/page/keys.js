@@ -1,6 +1,7 @@
-// What keys do, and the dialog that says so.
+// The actions of keys, and the dialog that lists them.
 
-// Where somebody writes or chooses, all keys go there; a button with the focus keeps those that press it and that move.
+// Whether the element with the focus takes this key itself. Where the user writes or chooses, it takes all keys; a
+// button takes the keys that press it or move the focus.
 function isOwnKey({ key, target }) {
   return /^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName) ||
     (target.tagName === 'BUTTON' && /^( |Enter|Arrow.*|Home|End)$/.test(key));
@@ -9,7 +10,7 @@ function isOwnKey({ key, target }) {
 export class Keys {
   constructor() {
     this.actions = new Map();
-    this.actionsOf = new Map();  // elements, while they have the focus
+    this.actionsOf = new Map();  // actions of elements, while they have the focus
     this.dialog = document.getElementById('help');
     addEventListener('keydown', (event) => {
       if (event.ctrlKey || event.altKey || event.metaKey || this.dialog.open || isOwnKey(event)) return;
@@ -18,7 +19,7 @@ export class Keys {
       event.preventDefault();
       action(event);
     });
-    // A button that was clicked has done its work, and the keys are the page's again.
+    // A clicked button loses the focus, so that the page's keys act again.
     addEventListener('click', (event) => { if (event.detail > 0) event.target.closest?.('button')?.blur(); });
     document.getElementById('help-button').addEventListener('click', () => this.dialog.showModal());
     this.add('?', 'this help', () => this.dialog.showModal());
@@ -29,7 +30,7 @@ export class Keys {
     this.explain(text, shown);
   }
 
-  // Only while this element has the focus, and before all others.
+  // Adds an action that a key has only while this element has the focus. It goes before the page's action of this key.
   addFor(element, key, action) {
     if (!this.actionsOf.has(element)) this.actionsOf.set(element, new Map());
     this.actionsOf.get(element).set(key, action);

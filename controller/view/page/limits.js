@@ -1,9 +1,10 @@
-// Borders that the cell sets: the workspace, keep-out zones and the leash; they stand out while they act.
+// Draws the borders that the cell sets: the workspace, keep-out boxes and the leash. A border stands out while it acts.
 import * as THREE from './three/build/three.module.js';
 import { colour, onTheme } from './theme.js';
 import { vector } from './connection.js';
 
-// An open side is drawn this far from the other one, or from the origin.
+// An open side of a box is drawn twice this far, in m, from the opposite side. If both sides are open, each is drawn
+// this far from the origin.
 const FAR = 1.6;
 
 function boxOf(limits) {

@@ -1,4 +1,4 @@
-// Puts the page together: what comes from the session goes to the picture, the plots and the panel.
+// Puts the page together: passes the session's messages to the picture, the plots and the panel.
 import { Connection } from './connection.js';
 import { Control } from './control.js';
 import { Felt } from './felt.js';
@@ -50,7 +50,7 @@ const connection = new Connection({
   frames: (frames) => player?.showFrames(frames),
   spectrum: (bands) => spectrum?.show(bands),
   moment: (moment) => {
-    // What acted in a moment that is overtaken is told with the next one.
+    // If a moment is replaced before it was drawn, its flags go to the next moment.
     if (newest && !player) moment.flags_since = (moment.flags_since | newest.flags_since) >>> 0;
     newest = moment;
     if (player) player.show(moment); else plots.add(moment);
@@ -61,7 +61,7 @@ const connection = new Connection({
   },
 });
 
-// The newest moment is drawn once per frame of the browser, however many have come.
+// Draws the newest moment once per frame of the browser, however many moments have arrived.
 function frame(now) {
   requestAnimationFrame(frame);
   if (newest && stage) {
@@ -107,16 +107,16 @@ for (const [key, view] of [['0', 'overview'], ['1', 'top'], ['2', 'front'], ['3'
 keys.add('f', 'follow the tool', () => setFollow(!world.follow));
 keys.add('m', 'the touch, enlarged', toggleMicroscope);
 keys.add('d', 'dark or light', toggleTheme);
-const TURN = Math.PI / 36, SHIFT = 0.04, CLOSER = 0.9;  // of a key that is pressed once
+const TURN = Math.PI / 36, SHIFT = 0.04, CLOSER = 0.9;  // steps for each press of a key
 for (const [key, aside, up] of [['ArrowLeft', -1, 0], ['ArrowRight', 1, 0], ['ArrowUp', 0, 1], ['ArrowDown', 0, -1]]) {
   const move = (event) => (event.shiftKey ? world.shift(SHIFT * aside, SHIFT * up) : world.turn(TURN * aside, TURN * up));
   keys.add(key, '', move);
-  keys.addFor(element('picture'), key, move);  // in a record, whose player takes two of them elsewhere
+  keys.addFor(element('picture'), key, move);  // for records, whose player uses the keys ← and → otherwise
 }
 keys.explain('orbit; with Shift: move (in a record: once the picture was clicked)', '← → ↑ ↓');
 keys.add('+', 'closer', () => world.zoom(CLOSER));
 keys.add('=', '', () => world.zoom(CLOSER));
 keys.add('-', 'further away', () => world.zoom(1 / CLOSER), '−');
 
-// For tests and for the curious.
+// For tests, and for users who open the browser's console.
 globalThis.proxarm = { world, plots, panel, microscope, get felt() { return felt; }, get spectrum() { return spectrum; }, connection, get control() { return control; }, get stage() { return stage; }, get player() { return player; } };

@@ -1,18 +1,19 @@
-// How far from swinging: the mass that is felt over the smallest that is stable where the arm last came by a new place, as
-// the session judges it; in words, and as colour along the way of the tool. Live it comes with the status, of a record with
-// the stage.
+// The margin to instability: the felt mass divided by the smallest stable mass, at the last new place to which the arm
+// came, as the session judges it. It is shown in words, and as coloured dots along the tool's way. A running session
+// sends margins with its status, a record sends them with the stage.
 import * as THREE from './three/build/three.module.js';
 import { vector } from './connection.js';
 import { colour, onTheme } from './theme.js';
 
-// By the ratio, up to `below`. The nearer to swinging the larger the dots, which says it without colours.
+// Classes of the ratio, each up to `below`. Dots are larger where the margin is smaller, so that classes differ without
+// colours, too.
 export const CLASSES = [
   { below: 1, colour: '--margin-1', words: 'under 1: may swing', px: 8 },
   { below: 1.5, colour: '--margin-2', words: '1 to 1.5', px: 6 },
   { below: 3, colour: '--margin-3', words: '1.5 to 3', px: 5 },
   { below: Infinity, colour: '--margin-4', words: 'over 3', px: 4 },
 ];
-const APART_M = 2e-3;     // of two dots
+const APART_M = 2e-3;  // distance between two dots
 const MOST_DOTS = 4000;
 
 let margins = [];
@@ -25,7 +26,7 @@ export function addMargin(margin) {
 export const marginAt = (time_s) => margins.filter((margin) => margin.time_s <= time_s + 1e-9).pop();
 export const marginCount = () => margins.length;
 
-// 0: none is stable there.
+// Returns the ratio of felt mass to smallest stable mass; 0 if no mass is stable there.
 export const ratioOf = ({ felt_mass_kg: felt, smallest_stable_mass_kg: smallest }) => (smallest === null ? 0 : felt / smallest);
 export const classOf = (ratio) => CLASSES.findIndex(({ below }) => ratio < below);
 
@@ -36,7 +37,7 @@ export function overSmallest(margin) {
   return `${ratio < 1 ? '! ' : ''}${smallest.toPrecision(2)} kg (${ratio.toFixed(2)} ×)`;
 }
 
-// Dots along where the tool was, in the colour of what was judged there; none before anything was.
+// Dots along the tool's way, in the colour of the margin there. There are no dots before the first margin.
 export class MarginTrace extends THREE.Group {
   constructor(legend) {
     super();
@@ -59,7 +60,7 @@ export class MarginTrace extends THREE.Group {
     }));
   }
 
-  // A record's whole way, once.
+  // Sets the whole way of a record.
   setWay(rows) {
     this.whole = true;
     this.way = [];
@@ -67,7 +68,7 @@ export class MarginTrace extends THREE.Group {
     this.paint();
   }
 
-  // The next moment of a session that runs. True: there is something new to draw.
+  // Adds the next moment of a running session.
   show(moment) {
     if (this.whole) return;
     const last = this.way[this.way.length - 1];

@@ -1,21 +1,23 @@
-// The touch, enlarged until what is too small for the picture is seen: how far the tool, and of a simulation its
-// steel, are from where the proxy presses. A section through the strongest contact, along its normal and along the way on
-// which the tool is aside. Where the tool can go less than a millimetre along the normal, as in a hole, the other side is
-// drawn as well; before anything is touched the section is the one through what is nearest.
+// An enlarged view of the contact, which shows what is too small for the picture: how far the tool is from the proxy's
+// contact, and in a simulation also the true tool ("steel"). The view is a section through the strongest contact, along
+// the contact's normal and along the direction in which the tool is aside. If the tool can move less than a millimetre
+// along the normal, as in a hole, the opposite side is drawn, too. If nothing is touched, the section is through the
+// nearest object.
 import { colour, dash, onTheme } from './theme.js';
 import { vector } from './connection.js';
 
-const LEAST_M = 1e-6, MOST_M = 1e-2;  // of the scale bar
-const BAR_PX = 64;                    // at least so long, at most 2.5 times
+const LEAST_M = 1e-6, MOST_M = 1e-2;  // shortest and longest scale bar
+const BAR_PX = 64;  // shortest length of the bar on the screen; the longest is 2.5 times that
 const STEPS = [1, 2, 5];
 const FONT = '11px system-ui, "DejaVu Sans", sans-serif';
-const MOST_TIMES = 20;                // the other side, of what else is in the picture
-const BORDER = 12;                     // what is too far aside stands so far from it
-const MARGIN = 30;                    // between what is furthest away and the border
+// The opposite side is shown if it is at most this many times as far away as everything else.
+const MOST_TIMES = 20;
+const BORDER = 12;  // distance from the border for what is too far aside
+const MARGIN = 30;  // distance between the farthest drawn thing and the border
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
-// 3.2e-5 → "32 µm".
+// Returns 3.2e-5 as "32 µm".
 export function length(m) {
   const size = Math.abs(m);
   if (size < 5e-8) return '0';
@@ -24,12 +26,12 @@ export function length(m) {
   return `${number >= 100 ? number.toFixed(0) : Number(number.toPrecision(2))} ${unit}`;
 }
 
-// Lengths of the bar: 1, 2, 5 µm … 10 mm.
+// Lengths of the scale bar: 1, 2, 5 µm … 10 mm.
 const BARS = [];
 for (let decade = -6; decade <= -3; ++decade) for (const step of STEPS) BARS.push(step * 10 ** decade);
 BARS.push(MOST_M);
 
-// In the section: aside and up, in metres from the place where the contact is.
+// Returns the positions in the section, [aside, up] in metres from the contact.
 export function sectionOf(touch) {
   const normal = vector(touch, 'normal');
   const things = { tool: vector(touch, 'tool'), steel: vector(touch, 'steel') };
@@ -43,7 +45,8 @@ export function sectionOf(touch) {
   return section;
 }
 
-// While nothing presses: the whole tool beside the proxy, which is `room_below_m` from what is nearest.
+// Returns a substitute for a contact while nothing is touched: tool and proxy, with the proxy `room_below_m` from the
+// nearest object. Returns null if no object is near.
 export function nearestTouch(moment) {
   if (!Number.isFinite(moment.room_below_m)) return null;
   const proxy = vector(moment, 'proxy'), steel = vector(moment, 'steel'), known = steel.some((x) => x !== 0);
@@ -56,7 +59,7 @@ export function nearestTouch(moment) {
   return touch;
 }
 
-// The other side above the surface that is touched, in metres; infinite where there is none.
+// Returns the distance in metres from the touched surface to the opposite side; infinite if there is none.
 export const otherSide = (moment) => (Number.isFinite(moment.room_above_m) ? moment.room_above_m + Math.max(0, moment.room_below_m) : Infinity);
 
 export class Microscope {
@@ -75,7 +78,7 @@ export class Microscope {
     return this.wanted;
   }
 
-  // Hidden where nothing is touched, nor within a millimetre.
+  // Shows a moment. The view is hidden if nothing is within a millimetre.
   show(moment) {
     this.moment = moment;
     const strongest = moment?.contact ? moment.touches.reduce((most, touch) =>
@@ -96,12 +99,13 @@ export class Microscope {
     return [width, height];
   }
 
-  // The longest bar of the table with which everything is within the picture, kept while it fits well enough.
+  // Returns pixels per metre. Takes the first scale bar of BARS with which everything is in the picture, and keeps the
+  // present bar while it fits well enough.
   scale(room) {
     const places = ['proxy', 'tool', 'steel'].filter((name) => this.section[name]).map((name) => this.section[name]);
     const { other } = this.section, up = Math.max(LEAST_M / 20, ...places.map(([, y]) => Math.abs(y)));
-    // The other side is seen unless all else would become too small for that; its number stands there anyway. What is
-    // further aside than there is room stands at the border then.
+    // The opposite side is shown unless everything else would become too small; its distance is written in any case.
+    // Things that are too far aside are then drawn at the border.
     const fit = other < MOST_TIMES * up || other < MOST_TIMES * LEAST_M;
     const far = fit ? Math.max(up, other) : Math.max(up, ...places.map(([x]) => Math.abs(x) / 1.3));
     const fits = (bar) => (far / bar) * BAR_PX <= room;
@@ -127,7 +131,8 @@ export class Microscope {
     this.texts(width, height, scale);
   }
 
-  // The solid's side of a surface at `y0`, hatched, as far as `end`; `side`: 1 below, −1 above.
+  // Draws the solid side of a surface at `y0`, hatched, up to `end`. `side`: 1 if the solid is below, −1 if it is
+  // above.
   drawSolid(width, y0, end, side) {
     const c = this.context;
     c.fillStyle = colour('--solid');
@@ -191,7 +196,7 @@ export class Microscope {
     if (steel) lines.push(`× steel ${place(steel)}`);
     const fit = other < LEAST_M / 20 ? 'none' : length(other);
     if (Number.isFinite(other)) lines.unshift(narrow ? `room ${fit}` : `room to the other side: ${fit}`);
-    // A phone's picture is narrow.
+    // Reduces the font's size in a narrow picture, as on a phone.
     const widest = Math.max(...lines.map((line) => c.measureText(line).width));
     if (widest > width - 12) c.font = c.font.replace(/[\d.]+px/, `${(((narrow ? 10 : 11) * (width - 12)) / widest).toFixed(1)}px`);
     lines.forEach((line, i) => c.fillText(line, 8, height - 8 - 14 * (lines.length - 1 - i)));

@@ -1,11 +1,12 @@
-// The scene's objects: planes as grids with their free side, solids, meshes, skins, media, guides.
+// Draws the scene's objects: planes as grids that show their free side, solids, meshes, layers ("skins"), media,
+// guides.
 import * as THREE from './three/build/three.module.js';
 import { UP, Arrow, capsuleGeometry, cylinderGeometry, fetchMesh, lineOf, placeBetween, setPose, vec } from './shapes.js';
 import { colour, onTheme } from './theme.js';
 
 const PLANE_SIZE = 1.1, PLANE_CELL = 0.1, HATCH = 0.045, MEDIUM_DEPTH = 0.2;
 
-// Materials whose colours follow the theme.
+// Makes the materials, whose colours follow the theme.
 function makeMaterials() {
   const all = {
     solid: new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.86, side: THREE.DoubleSide }),
@@ -37,12 +38,12 @@ function segments(points, material) {
   return new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(points), material);
 }
 
-// At the point of a plane that is nearest to the tool, z along its normal.
+// Returns a group at the plane's point that is nearest to the tool, with z along the plane's normal.
 function atPlane(shape, near) {
   const normal = vec(shape.normal), point = vec(shape.point);
   const group = new THREE.Group();
   group.position.copy(near).addScaledVector(normal, -near.clone().sub(point).dot(normal));
-  // Upright planes have an upright grid: x of the square lies level.
+  // In an upright plane, the grid is upright, too: its x axis is horizontal.
   const level = new THREE.Vector3().crossVectors(UP, normal);
   if (level.lengthSq() < 1e-6) level.set(1, 0, 0).addScaledVector(normal, -normal.x);
   level.normalize();
@@ -51,7 +52,7 @@ function atPlane(shape, near) {
   return group;
 }
 
-// A medium's region that a plane ends: some depth of it.
+// Draws a part of a medium's region that ends at a plane, down to some depth.
 function makeHalfSpace(shape, near, materials) {
   const group = atPlane(shape, near);
   const slab = new THREE.Mesh(new THREE.BoxBufferGeometry(PLANE_SIZE, PLANE_SIZE, MEDIUM_DEPTH), materials.medium);
@@ -62,7 +63,7 @@ function makeHalfSpace(shape, near, materials) {
   return group;
 }
 
-// A square of the plane about where the tool is. Hatching lies on the side that is solid, an arrow on the free one.
+// Draws a square of the plane around the tool's place. Hatching lies on the solid side, an arrow on the free side.
 function makePlane(shape, near, materials) {
   const group = atPlane(shape, near);
   const half = PLANE_SIZE / 2, lines = [], hatch = [];
@@ -91,7 +92,8 @@ function roundGeometry(shape) {
   return shape.kind === 'capsule' ? capsuleGeometry(shape.radius, length) : cylinderGeometry(shape.radius, length);
 }
 
-// A solid's geometry and where it is; `more`: of its skin, which is that much thicker.
+// Returns a solid's geometry and the body that has its pose. `more`: added to the solid's size on all sides; negative
+// for the core below a layer.
 function solidGeometry(shape, more = 0) {
   const body = new THREE.Group();
   let geometry = null;
@@ -125,7 +127,7 @@ function makeObject(object, near, materials) {
   if (shape.kind === 'plane') {
     group.add(makePlane(shape, near, materials));
     if (object.layer) {
-      // The layer's thickness is the object's own: its outside is where the plane is described.
+      // A layer lies within the object: its outer side is at the plane.
       const geometry = new THREE.BoxBufferGeometry(PLANE_SIZE, PLANE_SIZE, object.layer.thickness);
       const skin = new THREE.Mesh(geometry, materials.skin);
       skin.name = 'skin';
@@ -180,7 +182,7 @@ export class SceneView extends THREE.Group {
     this.parts = stage.scene.objects.map((object) => makeObject(object, near, materials));
     if (this.parts.length) this.add(...this.parts);
     for (const medium of stage.scene.media) {
-      if (!medium.within) continue;  // everywhere: the panel says so
+      if (!medium.within) continue;  // a medium everywhere: the panel describes it
       const group = medium.within.kind === 'plane' ? makeHalfSpace(medium.within, near, materials) : new THREE.Group();
       group.name = 'medium';
       addSolid(group, medium.within, materials.medium, materials, false);

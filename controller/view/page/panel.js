@@ -1,15 +1,15 @@
-// What the session is doing, in words and figures.
+// Shows what the session is doing, in words and figures.
 import { vector } from './connection.js';
 import { addMargin, marginAt, overSmallest, setMargins } from './margins.js';
 
-const MOMENTARY_MS = 700;  // for how long a limit that acted is still told while time runs: shorter can't be read
-const JUMP_S = 0.3;        // between two moments of a record that don't follow each other
+const MOMENTARY_MS = 700;  // for how long a flag stays visible in a running session, so that it can be read
+const JUMP_S = 0.3;  // a longer time between two moments means a jump in a record
 
 const BETWEEN_FIGURES_MS = 100;
 
 const element = (id) => document.getElementById(id);
 
-// As the panel and the labels in the picture have it.
+// Returns a force as text, for the panel and for the labels in the picture.
 export const newtons = (force_N) => `${force_N.toFixed(2)} N`;
 
 function length(m) {
@@ -25,7 +25,7 @@ const newtonMetres = (moment, name) => `${Math.hypot(...vector(moment, name)).to
 const turns = (moment) => moment.inertia_kg_m2 > 0;
 const feelsTorque = (moment, stage) => turns(moment) || stage.tool.parts.length > 0;
 
-// A label, its text, and of some figures whether there is such a thing.
+// Figures: label, text, and for some figures whether they are shown.
 const SESSION_FIGURES = [
   ['hand’s force', (m) => newtons(m.hand_N)],
   ['hand’s torque', (m) => newtonMetres(m, 'torque'), feelsTorque],
@@ -44,7 +44,7 @@ const SESSION_FIGURES = [
   ['timestep', (m) => `${(1e3 * m.period_s).toFixed(2)} ms`],
 ];
 
-// Of the simulated arm alone.
+// Figures for the simulated arm alone.
 const ARM_FIGURES = [
   ['hand’s force', (m) => newtons(m.hand_N)],
   ['load on the sensor', (m) => newtons(m.sensor_N)],
@@ -53,7 +53,7 @@ const ARM_FIGURES = [
   ['tool, z', (m) => `${m.tool_z.toFixed(4)} m`],
 ];
 
-// All that press at once, each named once; the guide comes after the scene's objects.
+// Returns the names of all touched objects, each once. The guide's index follows the scene's objects.
 function name(stage, moment) {
   const { objects, guide } = stage.scene;
   const names = moment.touches.map(({ object: index }) =>
@@ -61,7 +61,7 @@ function name(stage, moment) {
   return [...new Set(names)].join(', ');
 }
 
-// What of the scene has no place that could be drawn.
+// Returns notes on what can't be drawn because it is everywhere in the scene.
 function everywhere(scene) {
   const notes = scene.media.filter((medium) => !medium.within).map((medium) => {
     const parts = [medium.damping ? `damping of ${medium.damping} Ns/m` : '',
@@ -110,7 +110,7 @@ export class Panel {
     if (status.ended) this.end();
   }
 
-  // What is shown stays as it was in the last cycle.
+  // Marks the session as over. The shown figures stay those of the last cycle.
   end() {
     this.over = true;
     element('mode-chip').textContent = '○ over';
@@ -137,18 +137,18 @@ export class Panel {
     element('clock').textContent = `${moment.time_s.toFixed(2)} s`;
   }
 
-  // The moment that the figures are of.
+  // Returns the moment from which the shown figures come.
   get told() {
     return this.toldMoment;
   }
 
-  // Once per frame of the browser. `ofRecord`: the moment is one cycle of a record, which is told as it was, however
-  // long it is looked at; so is a session's last one.
+  // Called once per frame of the browser. `ofRecord`: the moment is one cycle of a paused record. Such a moment, and
+  // the last moment of a session, is shown as it was, for as long as it is visible.
   tick(now, ofRecord) {
     if (!this.moment) return;
     const still = ofRecord || this.over;
     this.showFlags(now, still);
-    // Figures that change faster can't be read.
+    // Figures that change faster than this can't be read.
     if (!this.newFigures || (!still && now - this.written < BETWEEN_FIGURES_MS)) return;
     this.newFigures = false;
     this.written = now;

@@ -1,11 +1,11 @@
-// Plays a record: a line of the whole session with what happened in it, and where we are.
+// Plays a record. Draws a time line of the whole session with its events and the present place.
 import { colour, onTheme } from './theme.js';
 
 const element = (id) => document.getElementById(id);
 const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
 const PLOT_WINDOW_S = 6;
-const SPECTRUM_MS = 250;      // so often the handle's vibration is asked for while it plays
-const FRAMES_AFTER_MS = 120;  // once the place rests for so long, the frames of the buses are fetched
+const SPECTRUM_MS = 250;  // how often the handle's vibration is requested while playing
+const FRAMES_AFTER_MS = 120;  // after this time at a place, the frames of the buses are requested
 
 function button(label, title, action) {
   const made = document.createElement('button');
@@ -114,7 +114,7 @@ export class Player {
     this.stale = true;
   }
 
-  // Once per frame of the browser.
+  // Called once per frame of the browser.
   tick(now) {
     if (this.playing) {
       const seconds = Math.min(0.2, (now - this.since) / 1e3);
@@ -140,7 +140,8 @@ export class Player {
     if (this.stale) this.draw();
   }
 
-  // The plots show some seconds about the place; asked for again when it comes near their end.
+  // Requests the window of rows for the plots, some seconds around the place. It is requested again when the place
+  // comes near an end of the window.
   wantWindow(index) {
     const half = Math.round((PLOT_WINDOW_S / 2) * this.perSecond);
     if (this.window && index - this.window[0] > half / 3 && this.window[1] - index > half / 3) return;
@@ -151,13 +152,13 @@ export class Player {
     this.connection.want({ window: this.window });
   }
 
-  // Whether that cycle is what is to be seen, in the picture as in the plots and the frames.
+  // Returns whether picture, plots and frames all show this cycle.
   isShown(index) {
     return this.asked === index && this.shown === index && this.listed === index && this.framesOf === index &&
       Boolean(this.plots.window) && performance.now() - this.moved > 400;
   }
 
-  // The first one is the whole record, decimated; each later one a window that was asked for.
+  // Takes rows. The first rows are the whole record, thinned out; later rows are a requested window.
   takeHistory(rows) {
     if (!this.overview.length) {
       this.overview = rows;

@@ -1,5 +1,5 @@
-// The last 20 s in four plots: forces, the way to the nearest surface, mass and energy, the cycle's computing time.
-// While something is touched the ground is shaded: plain where it sticks, hatched where it slips.
+// Four plots of the last 20 s: forces; distance to the nearest surface; mass and energy; compute time of a cycle.
+// During a contact, the background is shaded: plain while the contact sticks, hatched while it slips.
 import { PHASE_RENDERING } from './connection.js';
 import { evenForce } from './felt.js';
 import { colour, dash, onTheme } from './theme.js';
@@ -9,20 +9,22 @@ const MOST_ROWS = 1500;
 const STICK = 1, SLIP = 2;
 const LEFT = 46, RIGHT = 10, TOP = 24, BOTTOM = 20;
 const TEXT_HEIGHT = 11;
-const PEAK_WIDTH = 52, PEAK_SIGN = 5;  // of a peak's number; from its left end to the middle of its sign
-const HEAD_LEFT = 10, HEAD_ROW = 16, SAMPLE = 20;  // of what stands above the lines
+// PEAK_WIDTH: width of a peak's number. PEAK_SIGN: from the number's left end to the middle of its sign.
+const PEAK_WIDTH = 52, PEAK_SIGN = 5;
+// Sizes of the head above the lines.
+const HEAD_LEFT = 10, HEAD_ROW = 16, SAMPLE = 20;
 const HEAD_FONT = '600 12px system-ui, "DejaVu Sans", sans-serif', FONT = '11px system-ui, "DejaVu Sans", sans-serif';
 
-// Distances reach from a hand's width down to micrometres, on both sides of the surface: linear below LINEAR_MM,
-// logarithmic beyond.
+// Distances range from a hand's width down to micrometres, on both sides of the surface. Their scale is linear below
+// LINEAR_MM and logarithmic above.
 const LINEAR_MM = 0.05;
 const bent = (mm) => Math.asinh(mm / LINEAR_MM);
 const BENT_TICKS_MM = [-10, -1, -0.1, 0, 0.1, 1, 10, 100];
 
 const moved = (m, value) => (m.phase >= PHASE_RENDERING ? value : NaN);
 
-// Lines may leave the plot at its top for a moment: a blow of a millisecond would flatten all else. There stands how
-// high they go.
+// Lines may leave a plot at its top for a moment, since a blow of a millisecond would flatten everything else. The
+// peak's height is then written there.
 const SESSION_PLOTS = [
   { title: 'force', unit: 'N', least: 5, zero: true, lines: [
     { name: 'peaks', value: (m) => moved(m, m.contact_peak_N), as: 'peaks', peaks: true },
@@ -41,7 +43,7 @@ const SESSION_PLOTS = [
     live: true, note: overrunNote },
 ];
 
-// A cycle may be longer than its period without an overrun: in virtual time, which waits for it.
+// In virtual time a cycle may take longer than its period without an overrun, since virtual time waits for the cycle.
 function overrunNote(rows) {
   const { overruns } = rows[rows.length - 1];
   if (overruns > 0) return overruns === 1 ? '1 overrun' : `${overruns} overruns`;
@@ -50,7 +52,7 @@ function overrunNote(rows) {
   return `over the period: ${Number((1e-3 * longest.compute_peak_us).toPrecision(3))} ms`;
 }
 
-// Of the simulated arm alone, whose hand and sensor are what they are whatever its drives do.
+// Plots of the simulated arm alone, where hand and sensor have values in every phase of the drives.
 const ARM_PLOTS = [
   { title: 'force', unit: 'N', least: 5, zero: true, lines: [
     { name: 'hand', value: (m) => m.hand_N, as: 'hand' },
@@ -61,10 +63,11 @@ const ARM_PLOTS = [
     { name: 'in free motion', value: (m) => m.felt_kg, as: 'felt' }] },
 ];
 
-// Mass that the hand feels, by its force over the tool's acceleration along it: a running fit over about half a second of
-// free motion. The tool's place is filtered as the force is, so both are late by the same.
+// The mass that the hand feels: the hand's force along the tool's acceleration, divided by this acceleration. It is a
+// running fit over about half a second of free motion. Force and tool position are filtered equally, so both have the
+// same delay.
 class FeltMass {
-  // `anyMass`: what is felt isn't known to be a mass, as it is of a proxy.
+  // `anyMass`: whether a mass is shown although there is no proxy with a known mass.
   constructor(anyMass = false) {
     this.anyMass = anyMass;
     this.reset();
@@ -96,7 +99,7 @@ class FeltMass {
       });
     }
     const known = this.aTimesA > 0.5 && a.contact === 0 && c.contact === 0;
-    // The sensor doesn't see what moves the handle before it.
+    // The sensor doesn't see the force that moves the handle.
     const handle_kg = this.anyMass ? 0 : c.handle_kg;
     return known ? Math.min(200, Math.max(0, handle_kg + this.forceTimesA / this.aTimesA)) : NaN;
   }
@@ -136,7 +139,7 @@ class Plot {
     const ratio = Math.min(2, devicePixelRatio || 1);
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(height * ratio);
-    // Its box may end within a pixel, which would blur it.
+    // The box may end within a pixel, and scaling to it would blur the canvas.
     this.canvas.style.width = `${this.canvas.width / ratio}px`;
     this.canvas.style.height = `${this.canvas.height / ratio}px`;
     this.ratio = ratio;
@@ -159,7 +162,7 @@ class Plot {
       }
     }
     if (zero && heights.length > 20) {
-      // Neither does what lasts for a moment flatten the rest: it leaves the plot at its top.
+      // Short peaks don't determine the range either; they leave the plot at its top.
       heights.sort((a, b) => a - b);
       high = Math.max(least, Math.min(high, 2.5 * heights[Math.floor(0.97 * heights.length)]));
     }
@@ -186,7 +189,7 @@ class Plot {
     return out;
   }
 
-  // `headRows`: for how many rows of a head there is room, at least as many as layHead() has said.
+  // `headRows`: number of rows for the head, at least as many as layHead() has returned.
   draw(rows, from, to, playhead, headRows) {
     const c = this.context;
     if (!this.width || !this.height) return;
@@ -217,7 +220,7 @@ class Plot {
     this.tellPointed(rows, from, to, x);
   }
 
-  // The values under the pointer, of the row that is nearest to it.
+  // Shows the values of the row that is nearest to the pointer.
   tellPointed(rows, from, to, x) {
     const inside = this.pointer >= LEFT && this.pointer <= this.width - RIGHT && rows.length > 0;
     this.values.hidden = !inside;
@@ -294,7 +297,7 @@ class Plot {
       c.moveTo(LEFT, at);
       c.lineTo(this.width - RIGHT, at);
       c.stroke();
-      // In a low plot, figures about zero would lie over it.
+      // In a low plot, numbers near 0 would lie over the 0.
       if (value !== 0 && (Math.abs(at - y(0)) < TEXT_HEIGHT || Math.abs(at - last) < TEXT_HEIGHT)) continue;
       c.fillText(text, LEFT - 5, at);
       last = at;
@@ -324,7 +327,8 @@ class Plot {
     c.stroke();
   }
 
-  // Peaks above the plot, the highest of each that would lie over each other.
+  // Writes the heights of peaks that leave the plot at its top. Of peaks whose numbers would overlap, only the highest
+  // is written.
   numberPeaks(rows, high, x) {
     const c = this.context, { lines } = this.description;
     this.peaks = [];
@@ -355,7 +359,8 @@ class Plot {
     }
   }
 
-  // The title, each line's name behind a piece of it, and the note: in as many rows as that takes, which it returns.
+  // Lays out the head: the title, the name of each line after a sample of the line, and the note. Returns the number of
+  // rows that the head takes.
   layHead(rows) {
     const c = this.context, { title, unit, lines, note } = this.description;
     let x = HEAD_LEFT, row = 0;
@@ -418,7 +423,7 @@ export class Plots {
     this.felt = new FeltMass(alone);
   }
 
-  // A record has no computing times: they are the machine's.
+  // Hides plots of compute times, which a record doesn't have, since they depend on the machine.
   leaveOutLive() {
     for (const plot of this.plots) plot.canvas.parentElement.hidden = Boolean(plot.description.live);
     this.plots[0].canvas.parentElement.parentElement.classList.add('three');
@@ -435,7 +440,7 @@ export class Plots {
     this.stale = true;
   }
 
-  // A window of a record, with the place in it that is shown.
+  // Sets a window of a record, with the place that is shown.
   setWindow(rows, from, to, playhead) {
     this.felt.reset();
     this.rows = rows;
@@ -449,7 +454,7 @@ export class Plots {
     this.stale = true;
   }
 
-  // Twenty times a second is as often as an eye follows lines.
+  // Draws at most twenty times a second, which is fast enough for the eye to follow lines.
   draw(now) {
     if (now - this.drawn < 50 || !(this.stale || this.plots.some((plot) => plot.stale))) return;
     this.drawn = now;

@@ -1,4 +1,4 @@
-// Bodies of which everything else is made: geometry of shapes, thick arrows, lines.
+// Shapes of which all bodies in the picture are made: geometries, thick arrows, lines.
 import * as THREE from './three/build/three.module.js';
 
 export const UP = new THREE.Vector3(0, 0, 1);
@@ -7,18 +7,18 @@ export function vec(numbers) {
   return new THREE.Vector3(numbers[0], numbers[1], numbers[2]);
 }
 
-// x y z and quaternion x y z w, from an array at a place.
+// Sets an object's pose from numbers[at] on: x y z and quaternion x y z w.
 export function setPose(object, numbers, at = 0) {
   object.position.set(numbers[at], numbers[at + 1], numbers[at + 2]);
   object.quaternion.set(numbers[at + 3], numbers[at + 4], numbers[at + 5], numbers[at + 6]);
 }
 
-// Along z, about the origin; three.js has them along y.
+// Returns a cylinder along z about the origin; three.js has cylinders along y.
 export function cylinderGeometry(radius, length, segments = 36) {
   return new THREE.CylinderBufferGeometry(radius, radius, length, segments).rotateX(Math.PI / 2);
 }
 
-// Two half spheres and what is between them, along z.
+// Returns a capsule along z: two half spheres, and a cylinder of this length between them.
 export function capsuleGeometry(radius, length, rings = 10) {
   const profile = [];
   for (let i = 0; i <= rings; ++i) {
@@ -32,7 +32,7 @@ export function capsuleGeometry(radius, length, rings = 10) {
   return new THREE.LatheBufferGeometry(profile, 32).rotateX(Math.PI / 2);
 }
 
-// Corners, and three of them for each triangle.
+// Returns the geometry of a hull from its points, and from three indices of points for each triangle.
 export function hullGeometry({ points, triangles }) {
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(points.flat()), 3));
@@ -42,14 +42,14 @@ export function hullGeometry({ points, triangles }) {
   return separate;
 }
 
-// Puts a body that lies along z between two points.
+// Places an object that lies along z between two points.
 export function placeBetween(object, from, to) {
   const a = vec(from), b = vec(to);
   object.position.copy(a).add(b).multiplyScalar(0.5);
   object.quaternion.setFromUnitVectors(UP, b.sub(a).normalize());
 }
 
-// What stage.mesh_bytes() packs: numbers of vertices and triangles, coordinates, corners.
+// Fetches a mesh as Stage::mesh_bytes() packs it: number of vertices, number of triangles, coordinates, indices.
 export async function fetchMesh(path) {
   const answer = await fetch(path);
   if (!answer.ok) throw new Error(`the mesh ${path} can't be had`);
@@ -68,8 +68,8 @@ export function lineOf(points, material) {
   return new THREE.Line(geometry, material);
 }
 
-// An arrow with a body, so that it is seen from afar: solid, or of pieces. It points along z and is scaled by setTo().
-// One that is cut has a second head.
+// An arrow with a thick shaft, which is visible from afar. The shaft is whole, or of several pieces. The arrow points
+// along z, and setTo() scales it. An arrow that is cut has a second head.
 export class Arrow extends THREE.Group {
   constructor(material, { radius = 0.005, pieces = 1 } = {}) {
     super();
@@ -94,7 +94,8 @@ export class Arrow extends THREE.Group {
     for (const head of [this.head, this.second]) head.scale.setScalar(factor);
   }
 
-  // From a point, along a vector in metres; hidden where that is next to nothing. `cut`: it should be longer.
+  // Draws the arrow from a point along a vector in metres; hides it if the vector is shorter than 1 mm. `cut`: whether
+  // the arrow should be longer than it is drawn.
   setTo(from, along, cut = false) {
     const length = along.length();
     this.second.visible = cut;

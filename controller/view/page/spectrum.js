@@ -1,20 +1,20 @@
-// How the handle vibrates, beside the amplitudes from which on a hand notices it: third-octave bands of the last second,
-// both axes logarithmic (docs/view.md has the sources).
+// The handle's vibration and the amplitudes that a hand just notices: third-octave bands of the last second, on two
+// logarithmic axes (docs/view.md has the sources).
 import { colour, dash, onTheme } from './theme.js';
 
 const LEFT = 34, RIGHT = 6, TOP = 18, BOTTOM = 16;
-const EDGE = 10 ** 0.05;                   // of a band, from its centre
+const EDGE = 10 ** 0.05;  // factor from a band's centre to its edges
 const TICKS_HZ = [10, 20, 50, 100, 200, 400];
-const LEAST_UM = 1e-3, MOST_UM = 1e5;      // of the axis
+const LEAST_UM = 1e-3, MOST_UM = 1e5;  // ends of the axis
 const FONT = '10px system-ui, "DejaVu Sans", sans-serif';
 
-// 1234 → "1.2 mm", 0.031 → "0.031 µm".
+// Returns 1234 as "1.2 mm", 0.031 as "0.031 µm".
 export function micrometres(um) {
   if (um >= 1e3) return `${Number((1e-3 * um).toPrecision(2))} mm`;
   return um >= 1e-3 ? `${Number(um.toPrecision(2))} µm` : 'under 1 nm';
 }
 
-// The band that is furthest above what a hand notices, or least below it.
+// Returns the band whose amplitude is largest compared with what a hand notices.
 export function loudest(bands) {
   const told = bands.filter((band) => band.threshold_um !== null);
   return told.reduce((most, band) =>
@@ -35,7 +35,7 @@ export class Spectrum {
     onTheme(() => this.draw());
   }
 
-  // `at`: of which cycle of a record.
+  // `at`: the record's cycle to which the bands belong.
   show({ bands, of, at }) {
     if (this.section.hidden) return;
     this.bands = bands;

@@ -1,4 +1,4 @@
-// Dark and light: as the system has it, until somebody chooses.
+// Dark and light: as the system is set, until the user chooses.
 
 const listeners = [];
 let chosen = localStorage.getItem('proxarm-theme');
@@ -19,7 +19,8 @@ export function onTheme(listener) {
   listener();
 }
 
-// A colour of the style sheet: colour('--proxy'). Kept, since asking makes the browser lay out the page.
+// Returns a colour of the style sheet: colour('--proxy'). Colours are cached, since asking for one makes the browser
+// lay out the page.
 const colours = new Map();
 export function colour(name) {
   if (!colours.has(name)) {
@@ -28,7 +29,7 @@ export function colour(name) {
   return colours.get(name);
 }
 
-// The dash of a line of the table, in pixels: dash('proxy').
+// Returns the dash of a line style, in pixels: dash('proxy').
 export function dash(line) {
   const lengths = colour(`--dash-${line}`).split(' ').map(Number);
   return lengths[0] > 0 ? lengths : [];

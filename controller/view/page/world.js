@@ -1,4 +1,5 @@
-// The picture: camera, light, floor, and what stands on it. Draws when something has changed, as fine as the machine can.
+// The picture: camera, light, floor, and everything on it. It is drawn when something has changed, as finely as the
+// machine can.
 import * as THREE from './three/build/three.module.js';
 import { OrbitControls } from './three/examples/jsm/controls/OrbitControls.js';
 import { ArmView } from './arm.js';
@@ -12,7 +13,7 @@ import { colour, onTheme } from './theme.js';
 const SLOW_FRAME_MS = 32, FAST_FRAME_MS = 20;
 const RATIOS = [1, 0.8, 0.65, 0.5];
 
-// Where to look from, about the middle between arm and tool, or about the tool itself.
+// Camera positions, relative to the middle between arm and tool, or to the tool.
 const VIEWS = {
   overview: { from: [-1.06, -2.07, 0.6], about: 'middle' },
   tool: { from: [-0.28, -0.44, 0.2], about: 'tool' },
@@ -21,8 +22,9 @@ const VIEWS = {
   side: { from: [0, -2.2, 0.05], about: 'middle' },
 };
 
-const BAR_PX = 46;         // the buttons above, the legend below
-const USED_HEIGHT = 0.91;  // what the default arm takes of the picture's height in the overview, with room for an elbow that rises
+const BAR_PX = 46;  // height of the buttons above the picture and of the legend below it
+// Share of the picture's height that the default arm takes in the overview, with room for a rising elbow.
+const USED_HEIGHT = 0.91;
 
 const LABEL_HEIGHT = 22;
 const overlap = ([left, top, right, bottom], [l, t, r, b]) => left < r && l < right && top < b && t < bottom;
@@ -48,7 +50,7 @@ export class World {
     this.camera = new THREE.PerspectiveCamera(38, 1, 0.01, 60);
     this.camera.up.set(0, 0, 1);
     this.orbit = new OrbitControls(this.camera, canvas);
-    this.orbit.enableKeys = false;  // keys.js has them all
+    this.orbit.enableKeys = false;  // keys.js handles all keys
     this.orbit.minDistance = 0.08;
     this.orbit.maxDistance = 12;
     this.orbit.addEventListener('change', () => { this.changed = true; });
@@ -87,7 +89,7 @@ export class World {
     });
   }
 
-  // The first moment says where the tool is: planes are drawn about it.
+  // Builds the picture. The first moment says where the tool is, and planes are drawn around this place.
   build(stage, moment) {
     for (const part of [this.arm, this.objects, this.contacts, this.limits, this.margins]) if (part) this.scene.remove(part);
     this.tool.set(...vector(moment, 'tool'));
@@ -107,8 +109,8 @@ export class World {
   look(name) {
     const view = VIEWS[name];
     const about = view.about === 'tool' ? this.tool : this.middle;
-    // A narrow picture needs more distance for the same width, and so does a low one, since the buttons and the legend
-    // take of its height.
+    // A narrow picture needs a larger distance to show the same width. A low picture needs a larger distance, too,
+    // since buttons and legend cover part of its height.
     const narrow = Math.max(1, 1.35 / Math.max(0.3, this.camera.aspect));
     const low = Math.max(1, USED_HEIGHT / Math.max(0.3, 1 - (2 * BAR_PX) / this.height));
     this.orbit.target.copy(about);
@@ -117,7 +119,7 @@ export class World {
     this.changed = true;
   }
 
-  // Keys do what dragging does: round the middle of the picture, by angles;
+  // Keys act like dragging. Turns the camera around the middle of the picture, by angles.
   turn(aside, up) {
     const way = this.camera.position.clone().sub(this.orbit.target), far = way.length();
     const round = Math.atan2(way.y, way.x) + aside, most = Math.PI / 2 - 1e-3;
@@ -126,14 +128,14 @@ export class World {
     this.moveCamera(way);
   }
 
-  // nearer or further, by a factor of the distance;
+  // Moves the camera nearer or further away, by a factor of the distance.
   zoom(factor) {
     const way = this.camera.position.clone().sub(this.orbit.target);
     const far = Math.min(this.orbit.maxDistance, Math.max(this.orbit.minDistance, factor * way.length()));
     this.moveCamera(way.setLength(far));
   }
 
-  // aside and up, by shares of the distance.
+  // Moves the camera aside and up, by shares of the distance.
   shift(aside, up) {
     const way = this.camera.position.clone().sub(this.orbit.target), far = way.length();
     for (const [axis, share] of [[0, aside], [1, up]]) {
@@ -166,7 +168,7 @@ export class World {
     this.changed = true;
   }
 
-  // The moment whose numbers the labels have, as the panel's figures do: changes that are faster can't be read.
+  // Takes the moment from which the labels' numbers come, as the panel's figures do: faster changes can't be read.
   tell(moment) {
     if (this.told === moment) return;
     this.told = moment;
@@ -186,7 +188,7 @@ export class World {
     this.changed = true;
   }
 
-  // Once per frame of the browser.
+  // Called once per frame of the browser. Returns whether the picture was drawn.
   draw() {
     if (!this.changed) return false;
     this.changed = false;
@@ -202,11 +204,11 @@ export class World {
     return true;
   }
 
-  // Where drawing takes long, a coarser picture that moves is better than a fine one that jerks. `ms`: since the last
-  // picture, for the graphics work on after render() has returned. A finer one that was too slow is tried again later,
-  // and later still the next time.
+  // Adapts the resolution to the drawing time: a coarse picture that moves smoothly is better than a fine one that
+  // jerks. `ms`: time since the last picture, because the graphics hardware works on after render() has returned. A
+  // finer resolution that was too slow is tried again later, each time after a longer wait.
   adapt(ms) {
-    if (!(ms < 500)) return;  // nothing moved
+    if (!(ms < 500)) return;  // nothing has moved
     this.drawMs += 0.05 * (ms - this.drawMs);
     const now = performance.now();
     if (this.drawMs > SLOW_FRAME_MS && this.ratioStep + 1 < RATIOS.length) {
@@ -222,7 +224,7 @@ export class World {
     this.resize();
   }
 
-  // For a picture: as fine as the size allows, however long it takes.
+  // Draws as finely as the size allows, however long it takes, for saving the picture.
   drawFine() {
     this.ratioStep = 0;
     this.adapt = () => {};

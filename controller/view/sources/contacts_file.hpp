@@ -13,18 +13,18 @@ namespace proxarm::view {
 
 class ContactsFile {
  public:
-  // Throws SetupError for a file of another kind.
+  // Throws SetupError if the file is of another kind.
   explicit ContactsFile(const std::filesystem::path& folder);
 
-  // Sets the contacts of the cycle whose number the record has. A session recorded without this file has its signals'
-  // contacts, taken for a point's.
+  // Sets the contacts of the cycle whose number the record has. If the session was recorded without this file, the
+  // contacts come from the signals, and their places and forces are computed as for a point tool.
   void complete(controller::CycleRecord& record) const;
 
  private:
   using Store = void (*)(controller::RecordedContact& contact, std::size_t part, double value);
   struct Column {
-    Store store = nullptr;  // null: not a contact's column
-    std::size_t part = 0;   // component of a vector
+    Store store = nullptr;  // null: a column that isn't stored
+    std::size_t part = 0;   // index of the vector's component
   };
   [[nodiscard]] static Column column_named(std::string_view name);
   [[nodiscard]] std::size_t rows() const noexcept { return table_ ? table_->rows() : text_ ? text_->rows() : 0; }

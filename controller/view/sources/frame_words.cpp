@@ -18,7 +18,7 @@ std::string hex(std::uint32_t number, int digits) {
   return text.data();
 }
 
-// The object's name, as in CiA 402 and CiA 301.
+// Returns the object's name in CiA 402 or CiA 301, and its address.
 std::string name_of(const fieldbus::ObjectAddress& object) {
   struct Known {
     std::uint16_t index;
@@ -43,7 +43,7 @@ std::string name_of(const fieldbus::ObjectAddress& object) {
   return text;
 }
 
-// A little-endian number; with `is_signed`, two's complement.
+// Returns a little-endian number; with `is_signed`, it is a two's complement.
 std::int64_t number_at(const fieldbus::CanFrame& frame, std::size_t byte, std::size_t bytes, bool is_signed) {
   std::uint64_t value = 0;
   for (std::size_t i = bytes; i-- > 0;) value = value << 8U | frame.data[byte + i];
@@ -52,7 +52,7 @@ std::int64_t number_at(const fieldbus::CanFrame& frame, std::size_t byte, std::s
                                           : static_cast<std::int64_t>(value);
 }
 
-// Bit fields are printed in hexadecimal, positions also as angles.
+// Returns the value as text. Bit fields are in hexadecimal, positions also as angles.
 std::string value_of(const MappedObject& mapped, std::int64_t value, const DriveDescription& drive) {
   const std::uint16_t index = mapped.object.index;
   if (index == 0x6040 || index == 0x6041 || index == 0x60FD) {
@@ -99,7 +99,7 @@ std::string heartbeat_words(std::uint8_t state) {
   }
 }
 
-// Describes a frame of a drive's predefined connection set; empty if it is none of them.
+// Describes a frame of a drive's predefined connection set; empty if the frame isn't of this set.
 std::string drive_words(const fieldbus::CanFrame& frame, const DriveDescription& drive) {
   switch (frame.id - drive.node) {
     case 0x080:

@@ -1,4 +1,4 @@
-// Describes a frame on a cell's bus: its sender, the objects that it carries, and their values with units.
+// Describes a frame on a bus of the cell: the frame's sender, the objects in it, and the objects' values with units.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct FrameWords {
   std::string words;  // "target position 607Ah: 1234 = 0.0123 rad"
 };
 
-// `head` tells which of the cell's buses each bus of the network is.
+// `head` says which of the cell's buses each of the network's buses is.
 FrameWords describe_frame(const controller::BoxFrame& frame, const controller::ReplayHead& head,
                           const description::Cell& cell);
 

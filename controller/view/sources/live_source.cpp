@@ -6,14 +6,14 @@ namespace proxarm::view {
 
 namespace {
 constexpr double history_s = 20.0, between_rooms_s = 0.1;
-constexpr std::size_t most_rows = 1300;  // a little more than 20 s at 60 per second
+constexpr std::size_t most_rows = 1300;  // a little more than 20 s with 60 moments a second
 }  // namespace
 
 LiveSource::LiveSource(int descriptor, Stage& stage)
     : box_(descriptor), stage_(stage), builder_(stage.handle_mass_kg()), settings_(stage) {}
 
 bool LiveSource::advance() {
-  // The true pose is written just after its cycle.
+  // The true pose is written just after its cycle, so in simulation the number of true poses counts.
   const std::uint64_t told = box_.truths(), end = told > 0 ? told : box_.cycles();
   if (next_ >= end) return false;
   if (const std::uint64_t oldest = box_.oldest_cycle(); next_ < oldest) next_ = oldest;
@@ -48,7 +48,7 @@ std::string LiveSource::encode(const Moment& moment) {
   stage_.place(moment.record, moment.rendered_s, links_, objects_);
   Moment turned = moment;
   turned.tool_q = models::Quaternion(stage_.tool_pose(links_).linear());
-  // As often as the panel's figures change: a tool's distances to meshes take time.
+  // The room is computed as often as the panel's figures change, since a tool's distances to meshes take time.
   if (const double now_s = 1e-9 * static_cast<double>(moment.record.time_ns); now_s >= next_room_s_) {
     next_room_s_ = now_s + between_rooms_s;
     room_ = stage_.room(moment.record, moment.rendered_s);

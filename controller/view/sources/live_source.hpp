@@ -1,5 +1,5 @@
-// Reads a running session from the shared memory of its black box while the cycle writes there. The cycle isn't
-// involved.
+// Reads a running session from the shared memory of the session's black box, while the cycle writes there. The cycle
+// isn't involved.
 #pragma once
 
 #include <cstdint>
@@ -16,24 +16,26 @@ namespace proxarm::view {
 
 class LiveSource {
  public:
-  // Precondition: `stage` outlives this object. Throws std::runtime_error if the descriptor isn't that of a black box.
+  // Precondition: `stage` outlives this object. Throws std::runtime_error if the descriptor isn't of a black box.
   LiveSource(int descriptor, Stage& stage);
 
-  // Reads all cycles since the last call; in simulation, those whose true pose is written. Returns false if there was
-  // none.
+  // Reads all cycles since the last call; in simulation, only cycles whose true pose is written. Returns false if there
+  // was no such cycle.
   bool advance();
-  // Returns the moment of these cycles. Precondition: advance() has returned true since the last call.
+  // Returns the moment of the cycles that were read. Precondition: advance() has returned true since the last take().
   Moment take();
   [[nodiscard]] std::string encode(const Moment& moment);
 
-  // The session's settings after all cycles that were read. The second function returns true once after each change.
+  // Returns the session's settings after all cycles that were read.
   [[nodiscard]] const PresentSettings& settings() const noexcept { return settings_; }
+  // Returns true once after each change of the settings.
   bool have_settings_changed() noexcept { return std::exchange(settings_changed_, false); }
 
-  // The handle's vibration in the last second; empty before that. From the true pose in simulation.
+  // Returns the handle's vibration in the last second; empty before a second is complete. In simulation it is that of
+  // the true tool.
   [[nodiscard]] std::vector<controller::HandleSpectrum::Band> spectrum() const { return spectrum_.bands(); }
 
-  // The fields of the last 20 s of moments, one after the other, for pages that connect later.
+  // Returns the fields of the moments of the last 20 s, one moment after the other, for pages that connect later.
   [[nodiscard]] const std::vector<double>& history() const noexcept { return history_; }
 
  private:
@@ -49,7 +51,7 @@ class LiveSource {
   controller::HandleSpectrum spectrum_;
   std::vector<models::Pose> links_, objects_;
   std::optional<Room> room_;
-  double next_room_s_ = 0.0;  // when it is computed again
+  double next_room_s_ = 0.0;  // when room_ is computed again
   std::vector<double> history_;
 };
 

@@ -17,8 +17,8 @@ using controller::Phase;
 using description::Json;
 
 constexpr std::size_t most_events = 2000;
-constexpr std::int64_t apart_ns = 200'000'000;  // a sooner repetition counts as the same event
-// A contact of this length is no bounce, and its force isn't the impact's any more.
+constexpr std::int64_t apart_ns = 200'000'000;  // a repetition within this time counts as the same event
+// A contact that lasts this long isn't a bounce, and its force isn't an impact's any more.
 constexpr std::int64_t lasting_ns = 100'000'000;
 
 std::vector<std::string> axis_names(const Stage& stage) {
@@ -38,7 +38,7 @@ std::uint32_t holding_back() {
   return bits;
 }
 
-// Only a simulation's record has the tool's true place.
+// Returns whether the record has the tool's true place; only a simulation's record has it.
 bool is_true(const CycleRecord& record) { return controller::vec3(record.true_tool_W_m).norm() > 0.0; }
 
 std::string words_of(std::uint32_t flags) {
@@ -63,7 +63,7 @@ RecordedSession::RecordedSession(const std::filesystem::path& folder, Stage& sta
   index_frames();
 }
 
-// The last fault that wasn't reset; for a program that died, the reason for its black box.
+// Reads the last fault; for a program that died, the reason for its black box.
 void RecordedSession::read_fault(const std::filesystem::path& folder) {
   const Json summary = Json::parse(text_of_file(folder / "summary.json")).value_or(Json());
   if (const Json* faults = summary.find("faults"); faults && !faults->items().empty()) {
@@ -75,7 +75,7 @@ void RecordedSession::read_fault(const std::filesystem::path& folder) {
   fault_ = text_of_file(folder / "reason.txt");
   while (!fault_.empty() && fault_.back() == '\n') fault_.pop_back();
   fault_cycle_ = signals_.row(size() - 1).cycle;
-  // The box's own figures don't include faults, but its reason names the cycle.
+  // The figures of a black box don't include faults, but the reason names the cycle.
   const std::size_t named = fault_.find(" at cycle ");
   if (named != std::string::npos) fault_cycle_ = std::strtoull(fault_.c_str() + named + 10, nullptr, 10);
 }
@@ -85,7 +85,8 @@ void RecordedSession::find_events() {
   CycleRecord last = signals_.row(0);
   std::int64_t rendered = 0, limited_ns = -apart_ns, touched_ns = -apart_ns, since_ns = 0;
   std::int64_t longest_ns = -1;
-  std::size_t lasting = 0;  // the first cycle whose contact has lasted long enough, else the end of the longest contact
+  // The first cycle whose contact has lasted long enough; else the end of the longest contact.
+  std::size_t lasting = 0;
   const auto add = [&](RecordedEvent::Kind kind, std::size_t at, const CycleRecord& record, std::string text) {
     if (events_.size() < most_events) {
       events_.push_back({kind, at, 1e-9 * static_cast<double>(record.time_ns), std::move(text)});
@@ -134,7 +135,7 @@ void RecordedSession::index_frames() {
   for (controller::ReplayPlace at = log_.position(); log_.skip(); at = log_.position()) positions_.push_back(at);
 }
 
-// Moves the objects cycle by cycle, as in the session.
+// Moves the driven objects cycle by cycle, as in the session.
 void RecordedSession::follow_driven() {
   controller::BoxCycle cycle;
   std::vector<controller::BoxFrame> frames;
@@ -177,7 +178,7 @@ std::vector<controller::HandleSpectrum::Band> RecordedSession::spectrum(std::siz
   static_assert(controller::HandleSpectrum::window_s == 1.0);
   controller::HandleSpectrum spectrum;
   std::size_t first = index;
-  // Two cycles more, since the spectrum takes second differences of positions.
+  // Reads two cycles more than a second, since the spectrum takes second differences of positions.
   while (first > 0 && time_ns_[index] - time_ns_[first] < window_ns + 2 * (time_ns_[first] - time_ns_[first - 1])) {
     --first;
   }
@@ -192,7 +193,7 @@ std::vector<controller::HandleSpectrum::Band> RecordedSession::spectrum(std::siz
 
 bool RecordedSession::has_truth(std::size_t index) const { return is_true(signals_.row(index)); }
 
-// Of the cycle's touch, or of one that ended within the last second.
+// Returns the impact of the touch in this cycle, or of a touch that ended within the last 1000 cycles.
 Blow RecordedSession::blow_before(std::size_t index) const {
   constexpr std::size_t most = 1000;
   const auto touches = [this](std::size_t i) { return touch_begins_[i] <= i; };

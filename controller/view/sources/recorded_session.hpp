@@ -29,26 +29,27 @@ class RecordedSession {
 
   [[nodiscard]] std::size_t size() const noexcept { return signals_.size(); }
   [[nodiscard]] const std::vector<RecordedEvent>& events() const noexcept { return events_; }
-  // The cycle at which the record opens: the fault, else a contact that has lasted 0.1 s, else the end of the longest
-  // contact, else the beginning.
+  // Returns the cycle at which the record is opened: the fault; else a contact that has lasted 0.1 s; else the end of
+  // the longest contact; else the beginning.
   [[nodiscard]] std::size_t opening() const noexcept { return opening_; }
-  // For any thread.
+  // May be called by any thread.
   [[nodiscard]] double time_s(std::size_t index) const noexcept;
-  // The fault as the black box or the summary reports it; empty if there was none.
+  // Returns the fault that the black box or the summary reports; empty if there was no fault.
   [[nodiscard]] const std::string& fault() const noexcept { return fault_; }
-  // Whether moments of this cycle show the fault.
+  // Returns whether the moment of this cycle shows the fault.
   [[nodiscard]] bool is_faulted(std::size_t index) const noexcept { return !fault_.empty() && index >= fault_at_; }
 
-  // Precondition of all: index < size().
+  // Precondition of the functions below: index < size().
   [[nodiscard]] Moment moment(std::size_t index) const;
   [[nodiscard]] std::string encode(std::size_t index) const;
-  // The handle's vibration in the second that ends with this cycle; empty if there is no such second.
+  // Returns the handle's vibration in the second that ends with this cycle; empty if rendering hasn't lasted for a
+  // second then.
   [[nodiscard]] std::vector<controller::HandleSpectrum::Band> spectrum(std::size_t index) const;
-  // Whether the record has the tool's true place.
+  // Returns whether the record has the tool's true place in this cycle.
   [[nodiscard]] bool has_truth(std::size_t index) const;
-  // The fields of at most `rows` moments between two cycles, with the peaks between them.
+  // Returns the fields of at most about `rows` moments from one cycle to another, with the peaks between the moments.
   [[nodiscard]] std::vector<double> window(std::size_t from, std::size_t to, std::size_t rows) const;
-  // The frames on the buses in that cycle; empty if the record's replay doesn't contain the cycle.
+  // Returns the frames on the buses in this cycle; empty if the record's replay doesn't contain the cycle.
   std::vector<controller::BoxFrame> frames(std::size_t index);
   [[nodiscard]] const controller::ReplayHead& head() const noexcept { return log_.head(); }
 
@@ -63,12 +64,16 @@ class RecordedSession {
   controller::ReplayReader log_;
   SignalsFile signals_;
   ContactsFile contacts_;
-  std::uint64_t first_cycle_ = 0;            // number of the first row's cycle
-  std::vector<std::int64_t> time_ns_;        // of each cycle
-  std::vector<std::uint32_t> touch_begins_;  // of each cycle, the first cycle of its touch; the largest value: no touch
-  std::vector<std::int64_t> rendered_ns_;    // time rendered before each cycle, since the record's beginning
-  std::vector<controller::ReplayPlace> positions_;  // of each cycle in the log, from the log's first one on
-  std::vector<std::array<float, 3>> driven_m_;      // of each cycle and object; empty if no object is driven
+  std::uint64_t first_cycle_ = 0;      // number of the cycle in the first row
+  std::vector<std::int64_t> time_ns_;  // time of each cycle
+  // For each cycle, the index of the first cycle of its touch; the largest value: no touch.
+  std::vector<std::uint32_t> touch_begins_;
+  // For each cycle, the time that was rendered before it, since the record's beginning.
+  std::vector<std::int64_t> rendered_ns_;
+  // Position of each cycle in the log, from the log's first cycle on.
+  std::vector<controller::ReplayPlace> positions_;
+  // Displacement of each object in each cycle; empty if no object is driven.
+  std::vector<std::array<float, 3>> driven_m_;
   std::vector<RecordedEvent> events_;
   std::size_t opening_ = 0, fault_at_ = 0;
   std::uint64_t fault_cycle_ = 0;

@@ -24,7 +24,8 @@ Number number_of(const Field& field) {
   Number number{};
   if (!field.is_number) {
     std::from_chars(field.text.data(), field.text.data() + field.text.size(), number);
-  } else if (std::is_floating_point_v<Number> || std::abs(field.number) < 9e18) {  // no whole number is beyond that
+    // A whole number is never beyond 9e18.
+  } else if (std::is_floating_point_v<Number> || std::abs(field.number) < 9e18) {
     number = static_cast<Number>(field.number);
   }
   return number;
@@ -102,7 +103,7 @@ constexpr std::array singles{
     Named{"proxy_clearance_m", store_value<&CycleRecord::proxy_clearance_m>},
     Named{"tool_clearance_m", store_value<&CycleRecord::tool_clearance_m>}};
 
-// "force_W_x_N": a name, an axis, a unit.
+// A vector has three columns, named by the vector's name, an axis and a unit: "force_W_x_N".
 struct NamedVector {
   std::string_view name, unit;
   void (*store)(CycleRecord&, std::size_t, const Field&);
@@ -124,7 +125,7 @@ constexpr std::array vectors{NamedVector{"force_S", "N", store_part<&CycleRecord
                              NamedVector{"contact_torque_W", "Nm", store_part<&CycleRecord::contact_torque_W_Nm>},
                              NamedVector{"hand_torque_W", "Nm", store_part<&CycleRecord::hand_torque_W_Nm>}};
 
-// "contact_object_2", "friction_2", "normal_2_W_x_1": columns of further contacts.
+// Columns of further contacts are named "contact_object_2", "friction_2", "normal_2_W_x_1".
 constexpr std::array<std::string_view, 3> axes_in_names{"_x_", "_y_", "_z_"};
 
 struct OtherColumn {

@@ -1,5 +1,5 @@
-// A record's table as text (signals.csv, contacts.csv), mapped into memory: its header, and any row. The beginnings of
-// rows are found once. An incomplete last row counts as the end.
+// A record's table as text (signals.csv, contacts.csv), mapped into memory: the table's header, and any of its rows.
+// The beginnings of rows are found once. An incomplete last row counts as the end.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@ namespace proxarm::view {
 
 class TextTable {
  public:
-  // Throws SetupError if the file is missing or its header begins otherwise.
+  // Throws SetupError if the file is missing, or if its header doesn't begin with `header_begins`.
   TextTable(const std::filesystem::path& file, std::string_view header_begins);
   TextTable(const TextTable&) = delete;
   TextTable& operator=(const TextTable&) = delete;
   ~TextTable();
 
-  [[nodiscard]] std::vector<std::string_view> names() const;  // of its columns
+  [[nodiscard]] std::vector<std::string_view> names() const;  // names of the columns
   [[nodiscard]] std::size_t rows() const noexcept { return rows_.size(); }
   // Calls visit(column, text) for each field of a row. Precondition: row < rows().
   template <typename Visit>
@@ -30,7 +30,7 @@ class TextTable {
       at += value.size() + 1;
     }
   }
-  // The first field, a whole number.
+  // Returns the row's first field, a whole number.
   [[nodiscard]] std::uint64_t first(std::size_t row) const noexcept;
 
  private:
@@ -38,7 +38,7 @@ class TextTable {
     return text_.substr(at, text_.find('\n', at) - at);
   }
   std::string_view text_;
-  std::vector<std::uint64_t> rows_;  // where each begins
+  std::vector<std::uint64_t> rows_;  // offset of each row's beginning
 };
 
 }  // namespace proxarm::view

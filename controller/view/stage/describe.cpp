@@ -16,7 +16,7 @@ using models::Vec3;
 
 void put(JsonText& json, const Vec3& v) { json.begin_list().value(v.x()).value(v.y()).value(v.z()).end(); }
 
-// A pose in the order of the wire: x y z and quaternion x y z w.
+// Writes a pose in the order of the wire: x y z and quaternion x y z w.
 void put(JsonText& json, const Pose& X) {
   const Eigen::Quaterniond q(X.linear());
   json.begin_list();
@@ -135,7 +135,7 @@ void put_links(JsonText& json, const models::LinkTree& tree) {
   json.end();
 }
 
-// Infinite sides are open and written as null; a box without any finite side is null itself.
+// Writes a box. An infinite side is open, and written as null. A box without any finite side is written as null.
 void put_box(JsonText& json, const std::array<double, 3>& low, const std::array<double, 3>& high) {
   const auto is_border = [](double x) { return std::isfinite(x); };
   if (std::none_of(low.begin(), low.end(), is_border) && std::none_of(high.begin(), high.end(), is_border)) {
@@ -178,7 +178,7 @@ void put_words(JsonText& json, bool arm_alone) {
   json.end().end();
 }
 
-// Faces of a hull as triangles: its points, and three indices for each triangle.
+// Writes a hull as triangles: its points, and three indices for each triangle.
 void add_hull(JsonText& json, const models::ConvexTool& hull) {
   const models::Solid solid = models::solid_of(hull, Pose::Identity());
   json.add("kind", "hull").name("points").begin_list();
@@ -201,7 +201,7 @@ void add_mesh(JsonText& json, const models::MeshTool& mesh) {
   json.end();
 }
 
-// A part of a rigid tool, in its link's frame.
+// Writes a part of a rigid tool. The pose is in the frame of the tool's link.
 void put(JsonText& json, const models::ToolPart& part, const Pose& X_LT) {
   json.begin_object();
   add(json, "pose", Pose(X_LT * part.X_TP));

@@ -9,7 +9,7 @@
 
 namespace proxarm::view {
 
-// Puts a comma between two members or values, and nowhere else.
+// Writes a comma if a member or value precedes, else nothing.
 void JsonText::separate() {
   constexpr std::string_view nothing_before = "{[:";
   if (!text_.empty() && nothing_before.find(text_.back()) == std::string_view::npos) text_ += ',';
@@ -45,7 +45,7 @@ JsonText& JsonText::name(std::string_view name) {
 
 JsonText& JsonText::value(double number) {
   if (!std::isfinite(number)) return literal("null");
-  std::array<char, 32> digits;  // enough: the shortest exact text has at most 24 characters
+  std::array<char, 32> digits;  // the shortest exact text of a double has at most 24 characters
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
   return literal({digits.data(), static_cast<std::size_t>(end - digits.data())});
 }

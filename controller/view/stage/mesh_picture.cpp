@@ -32,16 +32,16 @@ double area(std::span<const Vec3> vertices, std::span<const Corners> triangles) 
   return 0.5 * twice;
 }
 
-// Rotates a triangle's corners so that the smallest comes first. The orientation is kept.
+// Returns a triangle's corners rotated so that the smallest index comes first. The triangle's orientation is kept.
 Corners begun_at_smallest(const Corners& t) {
   const auto first = static_cast<std::size_t>(std::min_element(t.begin(), t.end()) - t.begin());
   return {t[first], t[(first + 1) % 3], t[(first + 2) % 3]};
 }
 
-// Vertex clustering (Rossignac, Borrel 1993): all vertices within a cube of a grid become their mean, and triangles
-// that have two corners in one cube vanish.
+// Makes a mesh coarser by vertex clustering (Rossignac, Borrel 1993): all vertices within a cube of a grid are replaced
+// by their mean, and triangles with two corners in one cube are left out.
 Mesh clustered(std::span<const Vec3> vertices, std::span<const Corners> triangles, double cube) {
-  constexpr int bits = 21;  // of a cube's number along an axis: three of them fit into a key
+  constexpr int bits = 21;  // bits of a cube's number along an axis; three such numbers fit into a key
   Vec3 low = vertices.front(), high = low;
   for (const Vec3& v : vertices) low = low.cwiseMin(v), high = high.cwiseMax(v);
   cube = std::max(cube, (high - low).maxCoeff() / ((1 << bits) - 1));
@@ -88,7 +88,7 @@ std::string packed(std::span<const Vec3> vertices, std::span<const Corners> tria
 
 std::string mesh_picture(std::span<const Vec3> vertices, std::span<const Corners> triangles, const Vec3& scale) {
   if (triangles.size() <= most_triangles) return packed(vertices, triangles, scale);
-  // A cube on a smooth surface keeps about three triangles, on a rough surface more.
+  // First guess: a cube on a smooth surface keeps about three triangles. On a rough surface it keeps more.
   double cube = std::sqrt(3.0 * area(vertices, triangles) / static_cast<double>(most_triangles));
   Mesh coarse = clustered(vertices, triangles, cube);
   for (constexpr double larger = 1.2; coarse.triangles.size() > most_triangles;) {

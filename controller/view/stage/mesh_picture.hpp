@@ -1,5 +1,5 @@
-// Packs a mesh for display. Large meshes are made coarser: software rendering takes seconds for 300,000 triangles, each
-// of which would be smaller than a pixel.
+// Packs a mesh for display. Large meshes are made coarser: software rendering would take seconds for 300,000 triangles,
+// and each triangle would be smaller than a pixel.
 #pragma once
 
 #include <array>
@@ -11,11 +11,11 @@
 
 namespace proxarm::view {
 
-// The largest number of triangles sent. An object of 0.3 m keeps its shape to about a millimetre.
+// The largest number of triangles that is sent. With it, an object of 0.3 m keeps its shape to about a millimetre.
 inline constexpr std::size_t most_triangles = 80'000;
 
-// Packs a mesh for a GPU: uint32 number of vertices, uint32 number of triangles, then float x y z of each vertex and
-// uint32 a b c of each triangle. Precondition: corners are indices of vertices.
+// Packs a mesh for a GPU: uint32 number of vertices, uint32 number of triangles, float x y z of each vertex, uint32 a b
+// c of each triangle. Precondition: the corners of triangles are indices of vertices.
 std::string mesh_picture(std::span<const models::Vec3> vertices,
                          std::span<const std::array<std::uint32_t, 3>> triangles, const models::Vec3& scale);
 

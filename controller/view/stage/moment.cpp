@@ -66,14 +66,15 @@ struct VectorField {
   const char* name;
   Triple CycleRecord::*value;
 };
-constexpr std::array vectors{VectorField{"force", &CycleRecord::force_W_N},
-                             VectorField{"torque", &CycleRecord::torque_W_Nm},
-                             VectorField{"p_hat", &CycleRecord::p_hat_W_m},
-                             VectorField{"proxy", &CycleRecord::proxy_W_m},
-                             VectorField{"contact_force", &CycleRecord::contact_force_W_N},
-                             VectorField{"contact_torque", &CycleRecord::contact_torque_W_Nm},
-                             VectorField{"tool", &CycleRecord::tool_W_m},
-                             VectorField{"steel", &CycleRecord::true_tool_W_m}};  // zero: unknown
+constexpr std::array vectors{
+    VectorField{"force", &CycleRecord::force_W_N},
+    VectorField{"torque", &CycleRecord::torque_W_Nm},
+    VectorField{"p_hat", &CycleRecord::p_hat_W_m},
+    VectorField{"proxy", &CycleRecord::proxy_W_m},
+    VectorField{"contact_force", &CycleRecord::contact_force_W_N},
+    VectorField{"contact_torque", &CycleRecord::contact_torque_W_Nm},
+    VectorField{"tool", &CycleRecord::tool_W_m},
+    VectorField{"steel", &CycleRecord::true_tool_W_m}};  // the true tool in simulation; zero: unknown
 
 template <typename Number>
 void append(std::string& bytes, std::span<const Number> numbers) {
@@ -146,8 +147,9 @@ const std::vector<std::string>& contact_field_names() {
 
 namespace {
 
-// The displacement of a point of a rigid tool, in W, if the tool moves from the proxy's pose to this one. `point`: with
-// the tool at the proxy's pose. A tool that doesn't turn has the proxy's orientation.
+// Returns the displacement in W of a point of a rigid tool, if the tool moves from the proxy's pose to this place and
+// orientation. `point` is where the tool's point is with the tool at the proxy's pose. A tool that doesn't turn keeps
+// the proxy's orientation.
 Vec3 moved_with(const CycleRecord& record, const Vec3& point, const Vec3& place,
                 const models::Quaternion& orientation) {
   const Vec3 proxy = controller::vec3(record.proxy_W_m), arm = point - proxy;
@@ -156,10 +158,10 @@ Vec3 moved_with(const CycleRecord& record, const Vec3& point, const Vec3& place,
   return place - proxy + (turn * arm - arm);
 }
 
-// In the order of contact_field_names().
+// Appends the contacts' fields in the order of contact_field_names().
 void append_contacts(std::vector<double>& row, const Moment& moment) {
   const CycleRecord& record = moment.record;
-  // Only a simulation and its record have the tool's true place.
+  // The tool's true place is known only in simulations, and in their records.
   const Vec3 steel = controller::vec3(record.true_tool_W_m);
   const bool is_known = steel.norm() > 0.0;
   row.push_back(static_cast<double>(record.recorded_contacts()));

@@ -20,7 +20,7 @@ PresentSettings::PresentSettings(const Stage& stage)
 bool PresentSettings::follow(const controller::Change& change, double period_s_now) {
   const auto take = [](auto& present, const auto& value) { return std::exchange(present, value) != value; };
   const bool other_period = take(period_s, period_s_now);
-  // The cycle skips a change that was checked for another timestep; both are whole nanoseconds.
+  // The cycle skips a change that was checked for another timestep. Both timesteps are whole nanoseconds.
   constexpr double same_s = 0.5e-9;
   if (change.period_s != 0.0 && std::abs(change.period_s - period_s_now) > same_s) return other_period;
   const auto object = static_cast<std::size_t>(change.object);

@@ -64,7 +64,7 @@ void Stage::complete(CycleRecord& record, double rendered_s) const {
 
 namespace {
 
-// The normal out of the strongest contact's object; zero if there is no contact.
+// Returns the normal out of the strongest contact's object; zero if there is no contact.
 Vec3 strongest_normal(const CycleRecord& record) {
   double most_N = 0.0;
   Vec3 normal = Vec3::Zero();
@@ -77,10 +77,12 @@ Vec3 strongest_normal(const CycleRecord& record) {
   return normal;
 }
 
-// The distance along `normal`, up to Room::most_m, after which the tool is deeper in an object than at the beginning.
+// Returns the distance along `normal` from which on the tool is deeper in an object than at the beginning; infinite
+// beyond Room::most_m.
 template <typename Gap>
 double way_to_other_side(const Gap& gap_m, const Vec3& normal) {
-  constexpr double first_m = 1e-6, tolerance_m = 1e-7;  // for other objects that are touched
+  // tolerance_m is for other objects that are touched.
+  constexpr double first_m = 1e-6, tolerance_m = 1e-7;
   constexpr int halvings = 16;
   const double begun_m = std::min(0.0, gap_m(Vec3::Zero()));
   const auto blocked = [&](double t) { return gap_m(t * normal) < begun_m - tolerance_m; };
@@ -116,7 +118,7 @@ std::optional<Room> Stage::room(const CycleRecord& record, double rendered_s) co
       const Vec3 step = step_m * Vec3::Unit(i);
       room.normal_W[i] = (gap_m(step) - gap_m(-step)) / (2.0 * step_m);
     }
-    if (!(room.normal_W.norm() > 0.1)) return std::nullopt;  // equally far from both sides
+    if (!(room.normal_W.norm() > 0.1)) return std::nullopt;  // the proxy is equally far from both sides
     room.normal_W.normalize();
   }
   room.above_m = way_to_other_side(gap_m, room.normal_W);

@@ -17,10 +17,11 @@ struct PhaseWords {
   const char* words;
 };
 [[nodiscard]] PhaseWords phase_words(controller::Phase phase) noexcept;
-// The state of the drives, for an arm whose controller is elsewhere.
+// Returns words for the state of the drives, for an arm that another program controls.
 [[nodiscard]] PhaseWords drive_words(controller::Phase phase) noexcept;
 
-// The fault that stopped the arm or for which it is held, with its place and figures; empty if there is none.
+// Returns a text on the fault that stopped the arm, or for which the arm is held, with its place and figures; empty if
+// there is no fault.
 [[nodiscard]] std::string fault_text(const controller::CycleRecord& record, const description::Cell& cell);
 
 }  // namespace proxarm::view

@@ -22,7 +22,7 @@ std::string contents(const fs::path& file) {
   return text;
 }
 
-// Empty if zlib fails.
+// Returns the body compressed by gzip; empty if zlib fails.
 std::string compressed(const std::string& body) {
   z_stream stream{};
   constexpr int gzip_window = 15 + 16;

@@ -11,7 +11,7 @@ constexpr std::size_t longest_target = 512;
 
 Verdict refusal(unsigned status, const char* reason) { return {Answer::refuse, status, reason, ""}; }
 
-// The value of `name` in a query such as "a=1&token=2"; empty if it isn't there.
+// Returns the value of `name` in a query such as "a=1&token=2"; empty if the query has no such name.
 std::string_view query_value(std::string_view query, std::string_view name) {
   while (!query.empty()) {
     const std::string_view part = query.substr(0, query.find('&'));
@@ -23,7 +23,7 @@ std::string_view query_value(std::string_view query, std::string_view name) {
   return {};
 }
 
-// The same for a Cookie header such as "a=1; b=2".
+// Returns the value of `name` in a Cookie header such as "a=1; b=2"; empty if the header has no such name.
 std::string_view cookie_value(std::string_view header, std::string_view name) {
   while (!header.empty()) {
     std::string_view part = header.substr(0, header.find(';'));
@@ -42,7 +42,8 @@ Gate::Gate(std::uint16_t port, std::vector<std::string> allowed_origins)
     : host_("127.0.0.1:" + std::to_string(port)),
       origin_("http://" + host_),
       token_(random_secret()),
-      cookie_name_("proxarm_" + std::to_string(port)),  // cookies ignore the port, so each session has a cookie name
+      // Cookies ignore the port, so the port is part of the cookie's name.
+      cookie_name_("proxarm_" + std::to_string(port)),
       cookie_(random_secret()),
       allowed_(std::move(allowed_origins)) {}
 
@@ -72,7 +73,7 @@ Verdict Gate::judge(const RequestHead& head) const {
 
   if (!head.origins.empty() && head.origins[0] != origin_) return refusal(403, "the request is of another origin");
   if (!head.fetch_site.empty() && head.fetch_site != "same-origin" && head.fetch_site != "none") {
-    // A request from elsewhere may only open the whole URL with its secret, as from a link in a terminal.
+    // A request from another page may only open the whole URL with the secret, as a link in a terminal does.
     if (!(path == "/" && with_token)) return refusal(403, "the request comes from another page");
   }
   if (path == "/" && !token.empty()) {
@@ -83,7 +84,8 @@ Verdict Gate::judge(const RequestHead& head) const {
   return {Answer::serve, 200, "", path == "/" ? "/index.html" : path};
 }
 
-// Browsers always send the origin of a WebSocket. Other programs may send none, but must know the secret.
+// Judges a request for a WebSocket. Browsers always send the origin of a WebSocket. Other programs may send no origin,
+// but must know the secret.
 Verdict Gate::judge_socket(const RequestHead& head, const std::string& path, bool with_token) const {
   if (head.method != "GET") return refusal(405, "only GET is answered");
   const bool own = head.origins.size() == 1 && head.origins[0] == origin_;

@@ -1,14 +1,14 @@
 // Decides from each request's head alone who may see the page and who may connect to it.
 //
-// Every program and user of this machine, and every web page open in its browsers, can reach a port on 127.0.0.1. What
-// a page from elsewhere can do, and what stops it here:
-//   names its own host that resolves to 127.0.0.1 (DNS rebinding)           Host must be 127.0.0.1 with the port
-//   sends forms, images, scripts or WebSockets here                         Origin and Sec-Fetch-Site must be ours,
+// Every program and user of this machine, and every web page that is open in its browsers, can reach a port on
+// 127.0.0.1. Left: what a web page from elsewhere can do. Right: what stops it here.
+//   it gives its own host name the address 127.0.0.1 (DNS rebinding)        Host must be 127.0.0.1 with the port
+//   it sends forms, images, scripts or WebSockets here                      Origin and Sec-Fetch-Site must be ours;
 //                                                                           only GET and HEAD, no bodies
-//   guesses the address, as may another program                             a secret of 256 bits in the URL; after the
-//                                                                           first load a cookie with another one
-// An allowed origin (--allow-origin) may open a WebSocket with one of the protocols for other tools, with the secret in
-// its URL. The page, its files and its own WebSocket are only for our origin.
+//   it guesses the URL, as another program may, too                         the URL has a secret of 256 bits; after the
+//                                                                           first load, a cookie has another secret
+// An allowed origin (--allow-origin) may open a WebSocket with one of the protocols for other tools. It needs the
+// secret in the URL. The page, the page's files and the page's WebSocket are only for our own origin.
 #pragma once
 
 #include <cstdint>
@@ -18,20 +18,20 @@
 
 namespace proxarm::view {
 
-// The head of a request. Headers that may occur only once are lists, so that a second one is noticed.
+// The head of a request. Headers that may occur only once are lists, so that a second occurrence is noticed.
 struct RequestHead {
   std::string method{}, target{};
   std::vector<std::string> hosts{}, origins{}, cookies{};
-  std::string fetch_site{};  // Sec-Fetch-Site; empty: the browser didn't send it
-  bool upgrade = false;      // the request asks for a WebSocket
+  std::string fetch_site{};  // Sec-Fetch-Site; empty: the browser didn't send this header
+  bool upgrade = false;      // whether the request asks for a WebSocket
   bool has_body = false;
 };
 
 enum class Answer : std::uint8_t {
-  serve,       // the file at `path`
+  serve,       // serve the file at `path`
   set_cookie,  // set the cookie, and redirect to the page without the secret in its URL
-  open_page,   // a WebSocket of the page
-  open_tool,   // a WebSocket of another tool
+  open_page,   // open a WebSocket of the page
+  open_tool,   // open a WebSocket of another tool
   refuse,
 };
 
@@ -48,9 +48,9 @@ class Gate {
   Gate(std::uint16_t port, std::vector<std::string> allowed_origins);
 
   [[nodiscard]] Verdict judge(const RequestHead& head) const;
-  // http://127.0.0.1:PORT/?token=…
+  // Returns http://127.0.0.1:PORT/?token=…
   [[nodiscard]] std::string url() const;
-  // The value of Set-Cookie.
+  // Returns the value of the header Set-Cookie.
   [[nodiscard]] std::string set_cookie() const;
   [[nodiscard]] const std::string& token() const noexcept { return token_; }
 
@@ -62,7 +62,8 @@ class Gate {
   std::vector<std::string> allowed_;
 };
 
-// Whether `text` is an origin as browsers send it: scheme://host, and the port unless it is the scheme's default.
+// Returns whether `text` is an origin as browsers send it: scheme://host, and the port unless it is the scheme's
+// default.
 bool is_origin(std::string_view text) noexcept;
 
 }  // namespace proxarm::view

@@ -37,7 +37,7 @@ RequestHead head_of(const http::request_parser<http::empty_body>& parser) {
   return head;
 }
 
-// Headers of each answer: no other page may embed ours, and ours embeds nothing from elsewhere.
+// Sets the headers of each answer. No other page may embed our page, and our page embeds nothing from elsewhere.
 template <typename Body>
 void protect(http::response<Body>& response) {
   response.set(http::field::server, "proxarm");
@@ -105,8 +105,8 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
     serve_socket(shared_, std::move(stream_), parser_->release(), channel);
   }
 
-  // A page from elsewhere may lead here, such as the one that opens the browser. The browser then wouldn't send a
-  // cookie with a redirect, so it gets the page itself.
+  // Answers a request with the secret. If another page leads here, such as the page that opens the browser, the browser
+  // wouldn't send the new cookie with a redirect. So such a request gets the page itself.
   void welcome(bool from_elsewhere) {
     if (from_elsewhere) return serve("/index.html", true);
     Text response{http::status::see_other, parser_->get().version()};
@@ -144,7 +144,7 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
     response.keep_alive(keep);
     response.prepare_payload();
     const auto whole = std::make_shared<Text>(std::move(response));
-    if (parser_->get().method() == http::verb::head) whole->body().clear();  // Content-Length stays
+    if (parser_->get().method() == http::verb::head) whole->body().clear();  // the header Content-Length stays
     stream_.expires_after(patience);
     http::async_write(stream_, *whole, [self = shared_from_this(), whole, keep](const error_code& error, std::size_t) {
       if (error || !keep) return self->end();

@@ -6,10 +6,11 @@
 
 namespace proxarm::view {
 
-// 256 random bits as 64 hexadecimal digits. Throws std::runtime_error if the system provides none.
+// Returns 256 random bits as 64 hexadecimal digits. Throws std::runtime_error if the system provides no random bits.
 std::string random_secret();
 
-// Compares in a time that doesn't depend on where the texts differ. Different lengths are detected at once.
+// Returns whether both texts are equal. The time doesn't depend on where the texts differ; only different lengths
+// return at once.
 bool same_secret(std::string_view a, std::string_view b) noexcept;
 
 }  // namespace proxarm::view

@@ -16,12 +16,12 @@
 
 namespace proxarm::view {
 
-// web_server.hpp gives the reasons.
+// web_server.hpp gives the reasons for these limits.
 inline constexpr std::size_t most_connections = 64;
 inline constexpr std::size_t longest_head = 8192, longest_message = 1024;
-inline constexpr auto patience = std::chrono::seconds(5);    // for a request's head, and for a reader that accepts
-                                                             // nothing
-inline constexpr auto idle_time = std::chrono::seconds(20);  // between two requests on one connection
+// Timeout for receiving a request's head, and for a reader that accepts no byte.
+inline constexpr auto patience = std::chrono::seconds(5);
+inline constexpr auto idle_time = std::chrono::seconds(20);  // timeout between two requests on one connection
 
 class Connection {
  public:
@@ -30,7 +30,7 @@ class Connection {
   Connection& operator=(const Connection&) = delete;
   virtual ~Connection() = default;
   virtual void close() = 0;
-  // whether it has presented the secret or the cookie
+  // Whether the connection has presented the secret or the cookie.
   bool known = false;
 };
 
@@ -44,13 +44,14 @@ struct ServerShared {
   WebServer::Finder finder;
   Channel* page = nullptr;
   Channel* tools = nullptr;
-  std::list<std::weak_ptr<Connection>> connections;  // oldest first
+  std::list<std::weak_ptr<Connection>> connections;  // the oldest connection first
   std::size_t sockets = 0;
-  // For all connections together. Connections without the secret have a separate budget, so they can't exhaust the
-  // others'.
+  // Budgets for all connections together. Connections without the secret have a separate budget, so they can't exhaust
+  // the budget of the others.
   Budget requests{300.0, 600.0}, requests_of_strangers{300.0, 600.0};
 
-  // Closes an unknown connection if there are too many. Returns false if all connections are known.
+  // Makes room for another connection: if there are too many, closes the oldest connection without the secret. Returns
+  // false if all connections have presented the secret.
   bool make_room();
 };
 using SharedPtr = std::shared_ptr<ServerShared>;

@@ -15,8 +15,8 @@ namespace http = beast::http;
 namespace websocket = beast::websocket;
 using boost::system::error_code;
 
-constexpr std::size_t most_waiting = 256;      // messages waiting for a reader
-constexpr int send_buffer_bytes = 256 * 1024;  // the kernel's buffer: how far a reader may lag unnoticed
+constexpr std::size_t most_waiting = 256;      // largest number of messages that wait for a reader
+constexpr int send_buffer_bytes = 256 * 1024;  // size of the kernel's buffer: how far a reader may lag unnoticed
 
 std::vector<std::string> offered_protocols(const Request& request) {
   std::vector<std::string> offered;
@@ -77,7 +77,7 @@ class SocketConnection final : public Connection, public Socket, public std::ena
     timer_.cancel();
     stream_.next_layer().socket().close(ignored);
     if (!std::exchange(open_, false)) return;
-    // Posted, so that it doesn't run within the channel's calls.
+    // The call is posted, so that it doesn't run within the channel's own calls.
     boost::asio::post(shared_->context, [self = shared_from_this()] { self->channel_.closed(self); });
   }
   [[nodiscard]] const std::string& protocol() const noexcept override { return protocol_; }
@@ -93,7 +93,7 @@ class SocketConnection final : public Connection, public Socket, public std::ena
     });
   }
 
-  // Messages of say() are sent before those of show().
+  // Sends what waits: messages of say() before moments of show().
   void write() {
     if (writing_ || !open_ || (waiting_.empty() && !moment_)) return;
     Bytes message;
@@ -122,7 +122,7 @@ class SocketConnection final : public Connection, public Socket, public std::ena
   SharedPtr shared_;
   Channel& channel_;
   websocket::stream<beast::tcp_stream> stream_;
-  boost::asio::steady_timer timer_;  // for the present write
+  boost::asio::steady_timer timer_;  // timeout of the present write
   beast::flat_buffer buffer_;
   std::string protocol_;
   std::deque<std::pair<Bytes, bool>> waiting_;

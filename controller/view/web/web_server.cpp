@@ -48,7 +48,7 @@ struct WebServer::State : std::enable_shared_from_this<WebServer::State> {
       self->accept();
     });
   }
-  // After a failed accept, usually for lack of file descriptors.
+  // Called after a failed accept, which usually lacks file descriptors.
   void accept_later() {
     retry.expires_after(std::chrono::milliseconds(50));
     retry.async_wait([self = shared_from_this()](const error_code& error) {
@@ -70,7 +70,7 @@ WebServer::WebServer(boost::asio::io_context& context, const ServerConfig& confi
 WebServer::~WebServer() {
   try {
     stop();
-  } catch (...) {  // out of memory while closing connections; their sockets close with them
+  } catch (...) {  // out of memory while closing connections; the connections' sockets close with them
   }
 }
 

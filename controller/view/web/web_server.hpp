@@ -1,8 +1,9 @@
 // HTTP and WebSocket server on 127.0.0.1 for one page and other tools, in one thread.
 //
-// No client can slow down the others. Limits: request heads of 8 KiB within 5 s, no bodies, 64 connections (the oldest
-// without the secret makes room), 16 WebSockets, messages of 1 KiB and 200 per second. For a slow reader only the
-// newest moment waits; a reader that accepts no byte for 5 s is disconnected.
+// No client can slow down the others. Limits: a request's head has at most 8 KiB and arrives within 5 s; no bodies; 64
+// connections, of which the oldest without the secret makes room for a new one; 16 WebSockets; messages of at most 1
+// KiB, at most 200 a second. Only the newest moment waits for a slow reader. A reader that accepts no byte for 5 s is
+// disconnected.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -22,7 +23,7 @@ using Bytes = std::shared_ptr<const std::string>;
 // The most WebSockets at a time.
 inline constexpr std::size_t most_viewers = 16;
 
-// One open WebSocket, as channels use it.
+// An open WebSocket, as channels use it.
 class Socket {
  public:
   Socket() = default;
@@ -30,9 +31,10 @@ class Socket {
   Socket& operator=(const Socket&) = delete;
   virtual ~Socket() = default;
 
-  // Sends a moment (binary). It replaces one that still waits, since only the newest counts.
+  // Sends a moment (binary). If an earlier moment still waits, the new one replaces it, since only the newest moment
+  // counts.
   virtual void show(Bytes moment) = 0;
-  // Sends a message. All are sent, in order; a reader with too many waiting is dropped.
+  // Sends a message. All messages are sent, in order. A reader for which too many messages wait is dropped.
   virtual void say(Bytes message, bool binary) = 0;
   virtual void drop() = 0;
   // Whether all messages and moments have been sent.
@@ -42,7 +44,7 @@ class Socket {
 };
 using SocketPtr = std::shared_ptr<Socket>;
 
-// A party that talks through sockets of one kind. All calls come from the server's thread.
+// A party that talks through WebSockets of one kind. All functions are called from the server's thread.
 class Channel {
  public:
   Channel() = default;
@@ -53,7 +55,7 @@ class Channel {
   virtual void opened(const SocketPtr& socket) = 0;
   virtual void received(const SocketPtr& socket, std::string_view message, bool binary) = 0;
   virtual void closed(const SocketPtr& socket) = 0;
-  // Chooses one of the subprotocols that a client offers; empty: none.
+  // Chooses one of the subprotocols that a client offers; empty: none of them.
   [[nodiscard]] virtual std::string choose(const std::vector<std::string>& offered) const = 0;
 };
 
@@ -64,7 +66,7 @@ struct ServerConfig {
 
 class WebServer {
  public:
-  // Returns the file for a path that isn't among the assets; null: there is none.
+  // Returns the file for a path that isn't among the assets; null: there is no such file.
   using Finder = std::function<AssetPtr(const std::string& path)>;
 
   // Listens at once. Precondition: `page` and `tools` outlive this object; `tools` may be null. Throws SetupError if
@@ -75,10 +77,10 @@ class WebServer {
   WebServer& operator=(const WebServer&) = delete;
   ~WebServer();
 
-  // The URL with the token.
+  // Returns the URL with the token.
   [[nodiscard]] std::string url() const;
   [[nodiscard]] std::uint16_t port() const;
-  // Closes all connections, and accepts no new ones.
+  // Closes all connections, and accepts no new connections.
   void stop();
 
  private:
