@@ -171,7 +171,7 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       check_cell(file, options.scene);
       return "cell";
     case FileKind::registers:
-      description::load_modbus_drive(file);
+      tell(controller::register_doubts(description::load_modbus_drive(file)));
       return "register map of a Modbus drive";
     case FileKind::eds:
       tell(description::load_eds(file).remarks);

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
-#include <initializer_list>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -19,168 +18,29 @@
 #include "controller/command_line/entry/help.hpp"
 #include "controller/command_line/entry/options.hpp"
 #include "controller/command_line/entry/program.hpp"
+#include "controller/command_line/options/run_words.hpp"
+#include "controller/command_line/options/session_options.hpp"
 #include "models/base/quantity.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
-#include "sim/devices/device_fault.hpp"
 
 namespace {
 
 using namespace proxarm;
-using command_line::BusMapping;
+using command_line::add_arm_option;
+using command_line::add_enabling_option;
+using command_line::add_fault_option;
+using command_line::add_hardware_option;
+using command_line::add_run_options;
+using command_line::add_session_options;
+using command_line::add_turning_options;
+using command_line::add_view_options;
+using command_line::add_without_enabling;
 using command_line::choice;
-using command_line::LookaheadChoice;
-using command_line::Pace;
+using command_line::leave_out;
 using command_line::quantity;
 using command_line::RunOptions;
 using command_line::whole_number;
-
-void add_fault_option(CLI::App& app, RunOptions& options) {
-  app.add_option(
-         "--fault", CLI::callback_t([&](const CLI::results_t& words) {
-           for (const std::string& word : words) options.faults.push_back(sim::parse_device_fault(word));
-           return true;
-         }),
-         "simulated devices only, may be repeated: let one fail, as DEVICE:KIND[=VALUE][@FROM[..UNTIL]], times "
-         "counted from power on, some 0.2 s before the first cycle. DEVICE is a joint (KIND: silent, fault=EMCY code, "
-         "device_type=VALUE, lacks=OBJECT, fixed=OBJECT, homed, heartbeat, sdo, "
-         "period, power, jammed, ignored, reversed, runaway=rad/s, weak=Nm, offset=rad, stuck) or sensor (KIND: "
-         "silent, samples, frozen, half, swapped, duplicated, short, checksum, "
-         "saturated, lost=N, status=BITS, "
-         "delay=US, channel=N, offset=FORCE, drift=N/s, scale=NUMBER, inverted, turned). Such as axis_2:silent@2s, "
-         "axis_3:fault=0x4210@2s, sensor:frozen@1s..1.5s")
-      ->type_name("TEXT")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-}
-
-void add_without_enabling(CLI::App& app, RunOptions& options) {
-  app.add_flag("--without-enabling-input", options.settings.without_enabling_input,
-               "leave out the cell's enabling input; needed on real interfaces for a cell that has none");
-}
-
-void add_enabling_option(CLI::App& app, RunOptions& options) {
-  app.add_option("--enabling", CLI::callback_t([&](const CLI::results_t& words) {
-                   for (const std::string& word : words) options.enabling.push_back(sim::parse_pressed_span(word));
-                   return true;
-                 }),
-                 "simulated enabling switch only, may be repeated: when it is pressed, FROM..UNTIL counted from the "
-                 "first cycle, such as 0.5s..3s (default: from 0.1s on); for a cell with enabling_input. "
-                 "squeezed:2s..2.5s: a switch with three positions is squeezed through")
-      ->type_name("[squeezed:]TIME..TIME")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-}
-
-void add_hardware_option(CLI::App& app, RunOptions& options) {
-  app.add_flag("--hardware{ask}", options.hardware,
-               "drives on real interfaces: shows a checklist to be confirmed on the terminal (scripts: "
-               "--hardware=checked)");
-}
-
-void add_supervision_options(CLI::App& app, RunOptions& options) {
-  app.add_option("--do", options.orders,
-                 "by script, counted from the first cycle: hold, resume, release, \"back-off 20mm\" or reset, such as "
-                 "hold@2s; may be repeated")
-      ->type_name("ORDER@TIME")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  app.add_option(
-         "--handle",
-         choice<bool>("--handle", {{"auto", false}, {"held", true}},
-                      [&](bool is) { options.settings.always_held = is; }),
-         "held: a hand or a load always acts on the handle, and no force is taken for the sensor's bias; the arm "
-         "coasts when it is let go. auto (default): a handle that nobody holds is found out")
-      ->type_name("auto|held");
-  app.add_option("--wait-after-fault",
-                 quantity([](const std::string& w) { return description::parse_duration(w, "--wait-after-fault"); },
-                          [&](double value) { options.settings.wait_after_fault_s = value; }),
-                 "after a stop by a fault, how long to wait for `proxarm reset` (default: the session ends)")
-      ->type_name("TIME");
-  app.add_option(
-         "--accept-force",
-         quantity([](const std::string& w) { return description::parse_force(w, "--accept-force"); },
-                  [&](double value) { options.settings.tare_spread_N = options.settings.zero_drift_N = value; }),
-         "start with a force of up to this on the handle while the sensor is tared (default: it may vary by 5 N, "
-         "and its mean by the cell's sensor.zero_drift_N); its mean is taken as zero")
-      ->type_name("N");
-  add_without_enabling(app, options);
-  add_hardware_option(app, options);
-  app.add_flag("--without-proof", options.without_proof,
-               "real drives of a cell that `proxarm prove` hasn't proven on them");
-}
-
-void add_session_options(CLI::App& app, RunOptions& options) {
-  app.add_option("cell", options.cell,
-                 "cell file (default: models/cells/default.yaml, a six-axis arm of the 150 kg class)")
-      ->type_name("FILE");
-  app.add_option("--scene", options.scene, "scene file (default: the cell's)")->type_name("FILE");
-  app.add_option("--hand", options.hand,
-                 "file of the simulated hand, such as sim/hands/touch.yaml (default: the cell's)")
-      ->type_name("FILE");
-  app.add_option("--mass",
-                 quantity([](const std::string& w) { return description::parse_mass(w, "--mass"); },
-                          [&](double value) { options.mass_kg = value; }),
-                 "mass that the hand feels, in kg, handle included")
-      ->type_name("KG");
-  app.add_option("--damping",
-                 quantity([](const std::string& w) { return description::parse_damping(w, "--damping"); },
-                          [&](double value) { options.damping_Ns_per_m = value; }),
-                 "damping against the world, in Ns/m (default: the cell's, else 0); impedance: of the virtual coupling "
-                 "(default 8)")
-      ->type_name("NS/M");
-  app.add_option("--spring",
-                 quantity([](const std::string& w) { return description::parse_stiffness(w, "--spring"); },
-                          [&](double value) { options.settings.spring_N_per_m = value; }),
-                 "spring to the start position, in N/m (default 0)")
-      ->type_name("N/M");
-  app.add_option("--stiffness",
-                 quantity([](const std::string& w) { return description::parse_stiffness(w, "--stiffness"); },
-                          [&](double value) { options.stiffness_N_per_m = value; }),
-                 "impedance: stiffness of the virtual coupling, in N/m (default 750)")
-      ->type_name("N/M");
-  using controller::Scheme;
-  app.add_option(
-         "--scheme",
-         choice<Scheme>("--scheme", {{"admittance", Scheme::admittance}, {"impedance", Scheme::impedance}},
-                        [&](Scheme value) { options.scheme = value; }),
-         "admittance: force in, positions out (drives in csp, ip or on Modbus); impedance: position in, torques "
-         "out (drives in cst, a light device). Default: what the cell's drives take")
-      ->type_name("admittance|impedance");
-  app.add_option("--timestep",
-                 quantity([](const std::string& w) { return description::parse_duration(w, "--timestep"); },
-                          [&](double value) { options.period_s = value; }),
-                 "timestep T with its unit: 1ms, 500us (default: the cell's)")
-      ->type_name("TIME");
-  app.add_option("--extra-delay",
-                 quantity([](const std::string& w) { return description::parse_duration(w, "--extra-delay"); },
-                          [&](double value) { options.extra_delay_s = value; }),
-                 "readings of the force sensor are this much older than the cell says, such as 8ms: simulated, and "
-                 "counted where stability is judged")
-      ->type_name("TIME");
-  app.add_option("--lookahead",
-                 quantity([](const std::string& w) { return LookaheadChoice::parse(w, "--lookahead"); },
-                          [&](LookaheadChoice value) { options.lookahead = value; }),
-                 "send the arm to where the proxy is going to be, which makes up for the loop's delay: off (default), "
-                 "auto, the horizon that is stable with margins for this mass, hand and cell, or a time, such as 8ms")
-      ->type_name("auto|off|TIME");
-  app.add_option("--gear-damping",
-                 choice<bool>("--gear-damping", {{"auto", true}, {"off", false}},
-                              [&](bool value) { options.damps_gears = value; }),
-                 "auto (default): where drives measure the torque of their gears, damp the arm's elastic modes by it, "
-                 "as hard as is stable with margins; off: don't")
-      ->type_name("auto|off");
-  app.add_option("--duration",
-                 quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
-                          [&](double value) { options.duration_s = value; }),
-                 "how long to render, with its unit (default 10s; at most a week)")
-      ->type_name("TIME");
-  app.add_option("--bus",
-                 quantity([](const std::string& w) { return BusMapping::parse(w); },
-                          [&](BusMapping value) { options.bus = std::move(value); }),
-                 "sim (default), one interface for all buses, or NAME=INTERFACE,…")
-      ->type_name("BUS");
-}
 
 void add_check_options(CLI::App& app, scenes::CheckOptions& options) {
   app.add_option("--states", options.states, "random states in which each object of a scene, and the whole, is tried")
@@ -197,146 +57,6 @@ void add_check_options(CLI::App& app, scenes::CheckOptions& options) {
                  "how deep states push (default 20mm), a tenth of the least radius at most: deeper in round things "
                  "there are several solutions")
       ->type_name("LENGTH");
-}
-
-// Removes options from a command on which they would have no effect.
-void leave_out(CLI::App& app, std::initializer_list<const char*> options) {
-  for (const char* option : options) app.remove_option(app.get_option(option));
-}
-
-void add_view_options(CLI::App& app, RunOptions& options, const char* what) {
-  app.add_flag("--view", options.view, what);
-  app.add_option(
-         "--view-port",
-         whole_number("--view-port",
-                      [&](std::uint64_t port) {
-                        if (port < 1024 || port > 65535) {
-                          throw description::SetupError(
-                              {.key = "--view-port", .found = std::to_string(port), .expected = "1024 to 65535"});
-                        }
-                        options.view_port = static_cast<std::uint16_t>(port);
-                      }),
-         "the port of the view on 127.0.0.1 (default: any that is free)")
-      ->type_name("PORT");
-  app.add_option("--allow-origin", options.allowed_origins,
-                 "a web page of this origin, such as https://app.example.org, may look as well, if it knows the "
-                 "address with its token; may be repeated")
-      ->type_name("ORIGIN")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-}
-
-void add_arm_option(CLI::App& app, std::filesystem::path& arm) {
-  app.add_option("--arm", arm,
-                 "cell file of the simulated arm, where it is another one than the controller takes it for")
-      ->type_name("FILE");
-}
-
-void add_turning_options(CLI::App& app, RunOptions& options) {
-  using controller::OrientationMode;
-  app.add_option(
-         "--orientation",
-         choice<OrientationMode>("--orientation", {{"held", OrientationMode::held}, {"free", OrientationMode::free}},
-                                 [&](OrientationMode value) { options.orientation = value; }),
-         "held (default): the tool keeps its orientation, as with an inertia beyond all bounds; free: the hand turns "
-         "it (the default with --inertia)")
-      ->type_name("held|free");
-  app.add_option(
-         "--tool", options.tool,
-         "file of the tool's shape, whose sides touch as well, such as scenes/tools/rod.yaml, or point (default: "
-         "the scene's, else the cell's, else a point)")
-      ->type_name("FILE|point");
-  app.add_option("--inertia",
-                 quantity([](const std::string& w) { return description::parse_inertia(w, "--inertia"); },
-                          [&](double value) { options.inertia_kg_m2 = value; }),
-                 "moment of inertia that the hand feels about each axis through the handle's point, in kg m², handle "
-                 "included; the tool turns under the hand's torque (default of a tool that turns: 0.05 more than the "
-                 "handle's)")
-      ->type_name("KGM2");
-  app.add_option(
-         "--turning-damping",
-         quantity([](const std::string& w) { return description::parse_turning_damping(w, "--turning-damping"); },
-                  [&](double value) { options.turning_damping_Nms_per_rad = value; }),
-         "damping of a tool that turns, in Nms/rad (default 0 with --inertia, else 0.5)")
-      ->type_name("NMS/RAD");
-  app.add_option(
-         "--turning-spring",
-         quantity([](const std::string& w) { return description::parse_turning_stiffness(w, "--turning-spring"); },
-                  [&](double value) { options.turning_spring_Nm_per_rad = value; }),
-         "spring of a tool that turns to its orientation at the start, in Nm/rad (default 0)")
-      ->type_name("NM/RAD");
-}
-
-void add_run_options(CLI::App& app, RunOptions& options) {
-  add_session_options(app, options);
-  add_fault_option(app, options);
-  add_arm_option(app, options.arm);
-  add_enabling_option(app, options);
-  add_supervision_options(app, options);
-  app.add_option("--pace",
-                 choice<Pace>("--pace", {{"virtual", Pace::virtual_time}, {"realtime", Pace::realtime}},
-                              [&](Pace value) { options.pace = value; }),
-                 "virtual (default in-process) or realtime")
-      ->type_name("virtual|realtime");
-  app.add_option("--order",
-                 choice<int>("--order", {{"1", 1}, {"2", 2}}, [&](int value) { options.settings.order = value; }),
-                 "1: eq. (26) (default); 2: its second-order sibling")
-      ->type_name("1|2");
-  add_turning_options(app, options);
-  using controller::Passivity;
-  app.add_option(
-         "--passivity",
-         choice<Passivity>("--passivity",
-                           {{"off", Passivity::off},
-                            {"observe", Passivity::observe},
-                            {"auto", Passivity::automatic},
-                            {"on", Passivity::on}},
-                           [&](Passivity value) { options.passivity = value; }),
-         "observe: energies at the hand's and the proxy's port, and oscillations; auto (the default): add damping "
-         "against those that last; on: against any at once; off: none of it")
-      ->type_name("off|observe|auto|on");
-  CLI::Option* record = app.add_option("--record", options.record_dir, "write the session to this folder");
-  record->type_name("DIR");
-  app.add_option(
-         "--signals",
-         choice<controller::SignalsForm>("--signals",
-                                         {{"csv", controller::SignalsForm::csv},
-                                          {"binary", controller::SignalsForm::binary},
-                                          {"packed", controller::SignalsForm::packed}},
-                                         [&](controller::SignalsForm form) { options.signals = form; }),
-         "how the record keeps its rows: packed (the default: a quarter of the size, frames.log with them), binary "
-         "(signals.bin: numbers in columns, which load in no time) or csv (signals.csv); `proxarm signals` makes text "
-         "of all")
-      ->type_name("packed|binary|csv")
-      ->needs(record);
-  app.add_option("--set", options.changes,
-                 "change a parameter when so much time has been rendered (holds and stops don't count), such as "
-                 "mass=3@4s (mass, damping, spring, inertia, turning_damping, turning_spring, tool_mass, "
-                 "tool_centre_m, lookahead, timestep, "
-                 "OBJECT.friction, OBJECT.position_m); may be repeated")
-      ->type_name("NAME=VALUE@TIME")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  app.add_option("--control", options.control,
-                 "take changes from `proxarm set` at this Unix socket, for its owner alone (default: none; PATH "
-                 "\"default\": where `proxarm set` looks by itself)")
-      ->type_name("PATH");
-  app.add_option("--black-box", options.black_box_dir,
-                 "where the last ten seconds go after a fault or a crash (default: black-box in the record, or "
-                 "proxarm-black-box)")
-      ->type_name("DIR");
-  app.add_option("--plot", options.plot_file, "write the plot to this SVG file")->type_name("FILE");
-  app.add_flag_callback(
-      "--no-plot", [&] { options.plot = false; }, "draw no plot");
-  add_view_options(app, options,
-                   "show the session in a browser, at an address on this machine that is printed; virtual time keeps "
-                   "pace with the clock then, and what is shown stays until Ctrl-C");
-  app.add_flag("--view-control", options.view_control,
-               "the same, and let it be changed there, as `proxarm set` and `proxarm hold` do");
-  app.add_flag("--json", options.json, "print the summary as one JSON object");
-  app.add_flag("--verbose", options.verbose, "print all figures, not the summary's eight lines");
-  app.add_flag("--force-unstable", options.force_unstable,
-               "simulation only: run with a mass that is predicted unstable");
 }
 
 void add_assess_options(CLI::App& app, command_line::AssessOptions& options) {

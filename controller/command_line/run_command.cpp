@@ -9,6 +9,7 @@
 #include "controller/command_line/sessions/simulated_run.hpp"
 #include "controller/command_line/sessions/view_process.hpp"
 #include "controller/command_line/sessions/zero_run.hpp"
+#include "controller/library/simulated_loop.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -46,24 +47,7 @@ void refuse_for_interfaces(const RunOptions& options) {
 
 namespace {
 
-// Returns the session of the simulated arm: `session`, or that of another cell (--arm) with the same buses.
-PreparedSession prepared_arm(const PreparedSession& session, RunOptions options) {
-  if (options.arm.empty()) return session;
-  options.cell = options.arm;
-  PreparedSession arm = prepare(options);
-  const auto names = [](const description::Cell& cell) {
-    std::string all;
-    for (const auto& bus : cell.buses) all += bus.name + " ";
-    for (const auto& drive : cell.drives) all += drive.joint + "/" + drive.bus + " ";
-    return all;
-  };
-  if (names(arm.cell) == names(session.cell)) return arm;
-  throw description::SetupError({.file = arm.cell.file.string(),
-                                 .key = "--arm",
-                                 .found = "other buses or joints than those of " + session.cell.file.string(),
-                                 .expected = "the same: a wrong direction, gear, link or sensor is what it is for"});
-}
-
+// What the view asks for of the other options.
 RunOptions with_view(RunOptions options) {
   options.view = options.view || options.view_control;
   if (options.view_control && options.control.empty()) options.control = view_control_path();
@@ -98,7 +82,7 @@ int run_command(const RunOptions& given) {
     options.view_place = view->place();
   }
   const int status = options.bus.simulated()
-                         ? SimulatedRun(session, prepared_arm(session, options), options, keeper).run()
+                         ? SimulatedRun(session, controller::simulated_arm(session, options), options, keeper).run()
                          : run_on_interfaces(session, options, keeper);
   if (options.view_control && given.control.empty()) remove_view_control();
   if (view) view->show_end(status);

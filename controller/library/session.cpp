@@ -1,12 +1,21 @@
 #include "controller/library/session.hpp"
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <exception>
+#include <mutex>
+#include <optional>
 #include <utility>
 
+#include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/preparation/zero_file.hpp"
+#include "controller/library/led_poses.hpp"
+#include "controller/library/session_files.hpp"
 #include "controller/library/session_summary.hpp"
-#include "models/base/quantity.hpp"
+#include "controller/report/latency.hpp"
 
 namespace proxarm {
 
@@ -16,30 +25,132 @@ using command_line::RunOptions;
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
+using LookAtRecord = std::function<void(const CycleRecord&)>;
 
-// Numbers are read as the command line reads them, so that it is one place that says which are taken.
-RunOptions run_options(const SessionOptions& given) {
-  using description::number_text;
-  RunOptions options;
-  options.cell = given.cell;
-  options.scene = given.scene;
-  options.hand = given.hand;
-  if (given.mass_kg) options.mass_kg = description::parse_mass(number_text(*given.mass_kg), "--mass");
-  if (given.timestep_s) {
-    options.period_s = description::parse_duration(number_text(*given.timestep_s) + "s", "--timestep");
+PreparedSession prepared_session(const RunOptions& options) {
+  PreparedSession session = command_line::prepare(options);
+  if (const auto kept = command_line::kept_zero(session, false)) session.settings.zero_S_N = kept->force_S_N;
+  command_line::require_runnable(session, options);
+  command_line::require_changes(session, options);
+  controller::require_plot_file(options.plot_file);
+  return session;
+}
+
+[[noreturn]] void refuse_asking(const std::string& line) {
+  throw SetupError({.found = description::in_quotes(line), .expected = "a session that runs to ask it of"});
+}
+
+// One session, from power on to power off.
+class OneRun {
+ public:
+  OneRun(const PreparedSession& session, const RunOptions& options, const controller::OwnParts& own);
+
+  // `before` is called before each cycle, `each` after.
+  void run(const LookAtRecord& each, const std::function<void()>& before);
+  [[nodiscard]] Summary summary();
+
+  [[nodiscard]] controller::Cycle& cycle() noexcept { return loop_.cycle(); }
+  [[nodiscard]] const command_line::ControlHandlers& handlers() const noexcept { return *handlers_; }
+
+ private:
+  void look(CycleRecord record, const sim::Truth& truth, const LookAtRecord& each);
+  void place_contacts(CycleRecord& record) const;
+
+  const PreparedSession& session_;
+  const RunOptions& options_;
+  const OwnWorld* world_;
+  const PreparedSession arm_;
+  controller::BlackBox box_;
+  controller::SimulatedLoop loop_;
+  controller::SessionFiles files_;
+  controller::SummaryBuilder builder_;
+  std::optional<controller::LedPoses> poses_;
+  std::optional<command_line::ControlHandlers> handlers_;
+  controller::SessionTally tally_;
+  std::int64_t rendered_ns_ = 0;
+  struct {
+    SteadyClock::duration figures{}, wall{};
+    controller::LatencyHistogram wake_up;
+  } took_;
+};
+
+controller::Replay replay_of(const controller::OwnParts& own) {
+  const bool replays = own.world == nullptr && !own.sensor && own.drives.empty();
+  return replays ? controller::Replay::kept : controller::Replay::none;
+}
+
+OneRun::OneRun(const PreparedSession& session, const RunOptions& options, const controller::OwnParts& own)
+    : session_(session),
+      options_(options),
+      world_(dynamic_cast<const OwnWorld*>(own.world)),
+      arm_(controller::simulated_arm(session, options)),
+      box_(controller::box_size(session, true).period_s, controller::box_size(session, true).frames_per_cycle),
+      loop_(session, own, {.arm = &arm_, .faults = options.faults, .enabling = options.enabling}),
+      files_(session, options, box_, replay_of(own)),
+      builder_(controller::summary_config(session)) {
+  if (!session.impedance()) poses_.emplace(session, options, files_.deriver());
+  if (files_.keeps_frames()) {
+    loop_.network().set_observer(
+        [this](const fieldbus::WireFrame& wire) { files_.add_frame(wire.bus_name, wire.frame, wire.end_ns); });
   }
-  options.duration_s = description::parse_duration(number_text(given.duration_s) + "s", "--duration");
-  if (given.damping_Ns_per_m != 0.0) {
-    options.damping_Ns_per_m = description::parse_damping(number_text(given.damping_Ns_per_m), "--damping");
-  }
-  options.settings.spring_N_per_m = description::parse_stiffness(number_text(given.spring_N_per_m), "--spring");
-  if (given.order != 1 && given.order != 2) {
-    throw SetupError({.key = "--order", .found = std::to_string(given.order), .expected = "1 or 2"});
-  }
-  options.settings.order = given.order;
-  options.lookahead = command_line::LookaheadChoice::parse(given.lookahead, "--lookahead");
-  options.force_unstable = given.force_unstable;
-  return options;
+  loop_.start();
+  cycle().write_to(box_);
+  command_line::schedule_changes(cycle(), session, options);
+  handlers_ = command_line::control_handlers(cycle(), session, options, box_);
+}
+
+void OneRun::run(const LookAtRecord& each, const std::function<void()>& before) {
+  const auto socket = command_line::control_socket(options_, *handlers_);
+  if (options_.pace == command_line::Pace::realtime) loop_.network().follow_real_time();
+  const SteadyClock::time_point begun = SteadyClock::now();
+  tally_ = loop_.run([&](const CycleRecord& record, const sim::Truth& truth) { look(record, truth, each); },
+                     controller::session_length(session_, options_),
+                     [&](std::int64_t) {
+                       took_.wake_up.add(loop_.network().woken_late_ns());
+                       if (loop_.exploded_after_s()) cycle().request_stop();
+                       before();
+                     });
+  took_.wall = SteadyClock::now() - begun;
+  if (loop_.exploded_after_s()) controller::refuse_explosion(*loop_.exploded_after_s());
+}
+
+void OneRun::look(CycleRecord record, const sim::Truth& truth, const LookAtRecord& each) {
+  if (record.phase == controller::Phase::rendering) rendered_ns_ += record.period_ns;
+  const SteadyClock::time_point completes = SteadyClock::now();
+  controller::add_truth(record, truth);
+  box_.add_truth(record.true_tool_W_m, record.true_tool_q_W);
+  controller::complete(record, session_, rendered_ns_);
+  place_contacts(record);
+  builder_.add(record);
+  if (poses_) poses_->add(record);
+  files_.add(record);
+  took_.figures += SteadyClock::now() - completes;
+  if (each) each(record);
+}
+
+// The world still has the contacts of the record's step: each record is seen before the next step.
+void OneRun::place_contacts(CycleRecord& record) const {
+  if (world_ == nullptr) return;
+  const std::span<const Vec3> points_W = world_->contact_points_W();
+  const std::size_t count = std::min(points_W.size(), record.recorded_contacts());
+  for (std::size_t i = 0; i < count; ++i) record.contacts[i].point_W_m = controller::triple(points_W[i]);
+}
+
+Summary OneRun::summary() {
+  Summary summary = controller::session_summary(builder_, cycle(), tally_.end,
+                                                {.reason = "asked", .text = "by the program"}, session_);
+  controller::add_idle_orders(summary, cycle(), options_);
+  summary.expected_swing = command_line::slowest_swing(session_);
+  if (poses_) summary.poses = poses_->summary();
+  summary.wall_time_s = std::chrono::duration<double>(took_.wall).count();
+  summary.figures_s = std::chrono::duration<double>(took_.figures).count();
+  summary.overruns = tally_.overruns;
+  summary.virtual_time = options_.pace != command_line::Pace::realtime;
+  if (!summary.virtual_time) summary.latency_us["wake_up"] = controller::latency_summary(took_.wake_up);
+  if (loop_.first_cycle_ns()) summary.first_cycle_s = 1e-9 * static_cast<double>(*loop_.first_cycle_ns());
+  summary.bus_load = loop_.bus_load();
+  files_.finish(summary);
+  return summary;
 }
 
 }  // namespace
@@ -50,10 +161,16 @@ struct Session::State {
   controller::OwnParts own;
   std::atomic<bool> stop_asked = false;
   std::exception_ptr thrown;  // by the hand, of which the physics must hear nothing
+  std::mutex asking;
+  OneRun* running = nullptr;  // guarded by `asking`
 
   // One session's run.
-  Summary run(const std::function<void(const CycleRecord&)>& each);
+  Summary run(const LookAtRecord& each);
   void guard(sim::HandForce& force);
+  void set_running(OneRun* run) {
+    const std::lock_guard<std::mutex> nobody_asks(asking);
+    running = run;
+  }
 };
 
 // The simulation's step can't throw.
@@ -70,44 +187,28 @@ void Session::State::guard(sim::HandForce& force) {
   };
 }
 
-Summary Session::State::run(const std::function<void(const CycleRecord&)>& each) {
+Summary Session::State::run(const LookAtRecord& each) {
   controller::OwnParts parts = own;
   guard(parts.hand);
   thrown = nullptr;
   stop_asked = false;
-  controller::SimulatedLoop loop(session, parts);
-  controller::SummaryBuilder builder(controller::summary_config(session));
-  std::int64_t rendered_ns = 0, exploded_at_ns = -1;
-  SteadyClock::duration figures{};
-  const SteadyClock::time_point begun = SteadyClock::now();
-  const controller::SessionTally tally = loop.run([&](CycleRecord record, const sim::Truth& truth) {
-    if (exploded_at_ns < 0 && !controller::is_possible(truth)) exploded_at_ns = truth.time_ns;
-    if (exploded_at_ns >= 0 || thrown || stop_asked) loop.cycle().request_stop();
-    if (record.phase == controller::Phase::rendering) rendered_ns += record.period_ns;
-    const SteadyClock::time_point completes = SteadyClock::now();
-    controller::add_truth(record, truth);
-    controller::complete(record, session, rendered_ns);
-    builder.add(record);
-    figures += SteadyClock::now() - completes;
-    if (each) each(record);
+  OneRun run(session, options, parts);
+  // ask() must not reach a run that has ended, or has thrown.
+  struct Running {
+    State& state;
+    Running(State& of, OneRun& one) : state(of) { state.set_running(&one); }
+    ~Running() { state.set_running(nullptr); }
+  } heard(*this, run);
+  run.run(each, [&] {
+    if (thrown || stop_asked) run.cycle().request_stop();
   });
   if (thrown) std::rethrow_exception(thrown);
-  if (exploded_at_ns >= 0) controller::refuse_explosion(1e-9 * static_cast<double>(exploded_at_ns));
-  Summary summary = controller::session_summary(builder, loop.cycle(), tally.end,
-                                                {.reason = "asked", .text = "by the program"}, session);
-  summary.wall_time_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
-  summary.figures_s = std::chrono::duration<double>(figures).count();
-  summary.overruns = tally.overruns;
-  summary.virtual_time = true;
-  if (loop.first_cycle_ns()) summary.first_cycle_s = 1e-9 * static_cast<double>(*loop.first_cycle_ns());
-  summary.bus_load = loop.bus_load();
-  return summary;
+  return run.summary();
 }
 
 Session::Session(const SessionOptions& options) : state_(std::make_unique<State>()) {
   state_->options = run_options(options);
-  state_->session = command_line::prepare(state_->options);
-  command_line::require_runnable(state_->session, state_->options);
+  state_->session = prepared_session(state_->options);
 }
 
 Session::~Session() = default;
@@ -121,8 +222,7 @@ Session& Session::set_world(GeometricAlgorithm<3>& world) {
   }
   // What the cell has as its scene isn't there then.
   options.scene = command_line::shipped_file("scenes/free.yaml");
-  state_->session = command_line::prepare(options);
-  command_line::require_runnable(state_->session, options);
+  state_->session = prepared_session(options);
   state_->session.scene.name = "a world of one's own";
   state_->own.world = &world;
   controller::require_own_world_fits(state_->session);
@@ -145,9 +245,27 @@ Session& Session::set_drive(const std::string& joint, controller::MakeDrive make
   return *this;
 }
 
-Summary Session::run(const std::function<void(const CycleRecord&)>& each) { return state_->run(each); }
+Summary Session::run(const LookAtRecord& each) { return state_->run(each); }
 
 void Session::stop() noexcept { state_->stop_asked = true; }
+
+std::string Session::ask(const std::string& line) {
+  const std::lock_guard<std::mutex> it_runs_on(state_->asking);
+  if (state_->running == nullptr) refuse_asking(line);
+  const command_line::ControlHandlers& handlers = state_->running->handlers();
+  if (!line.starts_with("status")) command_line::require_changeable(state_->session, line);
+  if (const std::optional<std::string> done = handlers.order(line)) return *done;
+  return handlers.change(line);
+}
+
+std::vector<std::string> Session::surprises() const { return command_line::surprises(state_->session); }
+
+std::vector<std::string> Session::objects() const {
+  if (const auto* const world = dynamic_cast<const OwnWorld*>(state_->own.world)) return world->objects();
+  std::vector<std::string> names;
+  for (const scenes::Object& object : state_->session.scene.objects) names.push_back(object.name);
+  return names;
+}
 
 const PreparedSession& Session::prepared() const noexcept { return state_->session; }
 

@@ -1,23 +1,21 @@
 // A session of the simulated arm in somebody's own program: the closed loop of `proxarm run`, in virtual time.
 //
-//   proxarm::Session session({.scene = "scenes/wall.yaml", .mass_kg = 4.0});
+//   proxarm::Session session({{"scene", "scenes/wall.yaml"}, {"mass", 4.0}});
 //   const proxarm::Summary summary = session.run([](const proxarm::CycleRecord& cycle) { … });
 //
-// It is assembled and checked as `proxarm run` does it, refuses what that refuses, with the same words, and moves the
-// arm to the same setpoints, to the bit. World, hand, force sensor and drives can be one's own (docs/library.md).
-// A real arm is run by the command line alone, which has its supervision, consent and clocks.
+// It takes the options of `proxarm run` (options.hpp), is assembled and checked by the same code, refuses the same with
+// the same words, and commands the same setpoints, to the bit. World, hand, force sensor and drives can be your own
+// (docs/library.md). Only the command line runs a real arm, with its supervision, consent and clocks.
 #pragma once
 
 #include <array>
-#include <atomic>
-#include <exception>
-#include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "controller/library/options.hpp"
+#include "controller/library/own_world.hpp"
 #include "controller/library/simulated_loop.hpp"
 #include "controller/record/cycle_record.hpp"
 #include "controller/report/summary.hpp"
@@ -33,26 +31,10 @@ using description::SetupError;
 using models::GeometricAlgorithm;
 using models::Vec3;
 
-// What `proxarm run` has as options, in SI units, meant for designated initialisers. Files that aren't there by that
-// name are looked for among those that come with proxarm; PROXARM_DATA says where these are, if they aren't where they
-// were installed.
-struct SessionOptions {
-  std::filesystem::path cell{};        // empty: the default cell
-  std::filesystem::path scene{};       // empty: the cell's
-  std::filesystem::path hand{};        // empty: the cell's; by its grip and its mass stability is judged
-  std::optional<double> mass_kg{};     // that the hand feels; unset: the cell's
-  std::optional<double> timestep_s{};  // unset: the cell's
-  double duration_s = 10.0;            // of rendering
-  double damping_Ns_per_m = 0.0;       // against the world; 0: the cell's
-  double spring_N_per_m = 0.0;         // to the start position
-  int order = 1;                       // 1: (26); 2: its second-order sibling
-  std::string lookahead = "off";       // "auto", "off" or a time, such as "8ms"
-  bool force_unstable = false;
-};
-
 class Session {
  public:
-  // Throws SetupError. Opens and starts nothing.
+  // A file that doesn't exist is looked up among those that come with proxarm: where they were installed, or below
+  // PROXARM_DATA. Throws SetupError. Opens and starts nothing.
   explicit Session(const SessionOptions& options = {});
   ~Session();
   Session(Session&&) noexcept;
@@ -60,8 +42,8 @@ class Session {
 
   // ---- before run(); each returns the session
 
-  // In the place of the scene: 𝒢 in W. It must outlive the session. Not with a scene or a lookahead, nor for an arm
-  // whose tool moves on a line or in a plane alone.
+  // In the place of the scene: 𝒢 in W; an OwnWorld also names its objects. It must outlive the session. Not with a
+  // scene, a tool with a shape or a lookahead, nor for an arm whose tool moves on a line or in a plane alone.
   Session& set_world(GeometricAlgorithm<3>& world);
   // In the place of the hand's motion and grip; of its file, its mass and, for the check of stability, its grip remain.
   // In N, on the handle, in W. What it throws ends the session, and comes out of run().
@@ -76,9 +58,21 @@ class Session {
   // for a session like the first one if the parts of one's own are as they were.
   Summary run(const std::function<void(const CycleRecord&)>& each = {});
 
-  // Asks the session that runs to stop, from within a callback or from another thread.
-  void stop() noexcept;
+  // ---- while it runs, from within a callback or from another thread
 
+  // Asks it to stop.
+  void stop() noexcept;
+  // Sends a line as to the session's socket (docs/supervision.md) and returns the answer: "hold", "resume", "mass=3kg",
+  // "wall.friction=0.2", "status". A tab separates changes that are made together. Throws SetupError if the session
+  // refuses, or if none runs.
+  std::string ask(const std::string& line);
+
+  // ---- any time
+
+  // The warnings of `proxarm run`: values that are possible but hardly meant, a sentence each.
+  [[nodiscard]] std::vector<std::string> surprises() const;
+  // The names of the objects; records have their indices.
+  [[nodiscard]] std::vector<std::string> objects() const;
   [[nodiscard]] const command_line::PreparedSession& prepared() const noexcept;
 
  private:

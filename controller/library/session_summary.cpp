@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "controller/command_line/live/live_parameters.hpp"
+#include "controller/command_line/live/orders.hpp"
 #include "controller/signals/clearances.hpp"
 #include "fieldbus/cia402/cia402_bring_up.hpp"
 
@@ -158,6 +160,32 @@ void add_faults(Summary& summary, const Cycle& cycle, const description::Cell& c
 
 }  // namespace
 
+SessionLength session_length(const command_line::PreparedSession& session, const command_line::RunOptions& options) {
+  SessionLength length{session.duration_s};
+  const bool somebody_presses =
+      session.cell.enabling_input && !session.settings.without_enabling_input && !options.bus.simulated();
+  if (options.control.empty() && !somebody_presses) length.longest_release_s = session.duration_s;
+  return length;
+}
+
+std::string rendered_text(const command_line::PreparedSession& session) {
+  const SessionSettings& s = session.settings;
+  char text[96];
+  if (session.impedance()) {
+    std::snprintf(text, sizeof text, "impedance type, K = %.4g N/m, B = %.4g Ns/m", s.coupling_stiffness_N_per_m,
+                  s.coupling_damping_Ns_per_m);
+  } else {
+    std::snprintf(text, sizeof text, "%.4g kg felt", s.mass_kg);
+  }
+  return text;
+}
+
+std::string plot_title(const command_line::PreparedSession& session) {
+  char period[32];
+  std::snprintf(period, sizeof period, ", T = %.4g ms", 1e3 * session.settings.period_s);
+  return session.scene.name + ": " + rendered_text(session) + period;
+}
+
 Summary session_summary(SummaryBuilder& builder, const Cycle& cycle, SessionEnd end, const EndSummary& asked,
                         const command_line::PreparedSession& session) {
   Summary summary = builder.finish();
@@ -167,6 +195,18 @@ Summary session_summary(SummaryBuilder& builder, const Cycle& cycle, SessionEnd 
   if (!session.scene.media.empty() || session.scene.coulomb_force_N) summary.friction_ratio_error.reset();
   add_faults(summary, cycle, session.cell);
   return summary;
+}
+
+void add_idle_orders(Summary& summary, const Cycle& cycle, const command_line::RunOptions& options) {
+  for (const ScheduledCommand& order : cycle.scheduled_commands()) {
+    if (order.taken && order.refusal == nullptr) continue;
+    summary.idle_orders.push_back({command_line::order_name(order.request.order),
+                                   static_cast<double>(order.at_ns) / 1e9,
+                                   order.taken ? order.refusal : "the session had ended before"});
+  }
+  for (const command_line::IdleChange& change : command_line::idle_changes(cycle, options.changes)) {
+    summary.idle_orders.push_back({"set " + change.text, change.time_s, change.refusal});
+  }
 }
 
 }  // namespace proxarm::controller

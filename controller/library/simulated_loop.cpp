@@ -19,6 +19,9 @@ using models::Vec3;
 // Faster than any tool by far; what explodes is there within some steps.
 constexpr double impossible_m_per_s = 1000.0;
 
+// Time that the last frames have to reach the drives. The longest queue of a cycle takes a millisecond.
+constexpr std::int64_t last_words_ns = 5'000'000;
+
 constexpr std::size_t drained_after_every_cycle = 64;
 
 // Somebody's own 𝒢, which the compiled scene would like to own.
@@ -67,44 +70,96 @@ void require_own_world_fits(const command_line::PreparedSession& session) {
   if (session.settings.looks_ahead) {
     throw SetupError({.key = "--lookahead", .found = "a world of one's own", .expected = "off with it"});
   }
+  if (session.scene.tool) {
+    throw SetupError({.key = "--tool",
+                      .found = "a tool with a shape, and a world of one's own",
+                      .expected = "point: such a world moves a point"});
+  }
   if (session.scene.space.dimensions == 3) return;
   throw SetupError({.file = session.cell.file.string(),
                     .found = "an arm whose tool can't move in all directions, and a world of one's own in space",
                     .expected = "an arm whose tool moves in space"});
 }
 
-SimulatedLoop::SimulatedLoop(const command_line::PreparedSession& session, const OwnParts& own)
+command_line::PreparedSession simulated_arm(const command_line::PreparedSession& session,
+                                            const command_line::RunOptions& options) {
+  if (options.arm.empty()) return session;
+  command_line::RunOptions of_arm = options;
+  of_arm.cell = options.arm;
+  command_line::PreparedSession arm = command_line::prepare(of_arm);
+  const auto names = [](const description::Cell& cell) {
+    std::string all;
+    for (const auto& bus : cell.buses) all += bus.name + " ";
+    for (const auto& drive : cell.drives) all += drive.joint + "/" + drive.bus + " ";
+    return all;
+  };
+  if (names(arm.cell) == names(session.cell)) return arm;
+  throw SetupError({.file = arm.cell.file.string(),
+                    .key = "--arm",
+                    .found = "other buses or joints than those of " + session.cell.file.string(),
+                    .expected = "the same: a wrong direction, gear, link or sensor is what it is for"});
+}
+
+namespace {
+
+sim::SimulatedCellConfig config_of(const SimulatedFarEnd& far_end) {
+  sim::SimulatedCellConfig config;
+  config.faults = far_end.faults;
+  config.enabling = far_end.enabling;
+  return config;
+}
+
+const command_line::PreparedSession& arm_of(const SimulatedFarEnd& far_end,
+                                            const command_line::PreparedSession& session) {
+  return far_end.arm != nullptr ? *far_end.arm : session;
+}
+
+// Whether an arm can move so.
+bool is_possible(const sim::Truth& truth) noexcept {
+  return truth.X_WT.matrix().allFinite() && truth.acceleration_W.allFinite() &&
+         truth.velocity_W.norm() < impossible_m_per_s;
+}
+
+}  // namespace
+
+SimulatedLoop::SimulatedLoop(const command_line::PreparedSession& session, const OwnParts& own,
+                             const SimulatedFarEnd& far_end)
     : session_(session),
-      network_(sim::simulated_buses(session.cell)),
-      far_end_(session.cell, session.sensor, session.hand, network_.events()),
+      own_(own),
+      network_(sim::simulated_buses(arm_of(far_end, session).cell)),
+      far_end_(arm_of(far_end, session).cell, arm_of(far_end, session).sensor, session.hand, network_.events(),
+               config_of(far_end)),
       scene_(scenes::compile(session.scene)) {
   if (own.world != nullptr) {
     require_own_world_fits(session);
     scene_.any_algorithm = std::make_unique<BorrowedWorld>(*own.world);
   }
   if (own.hand) far_end_.plant().set_hand(own.hand);
+}
+
+void SimulatedLoop::start() {
   const ModbusOpener open_line = [this](const description::ModbusLineDescription& line, double) {
     return far_end_.modbus_client(line.name);
   };
-  CycleParts parts = build_parts(session.cell, session.sensor, scene_, session.settings, network_,
-                                 command_line::buses_in_order(session.cell), open_line);
-  put_in(own, parts);
+  CycleParts parts = build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_,
+                                 command_line::buses_in_order(session_.cell), open_line);
+  put_in(parts);
   far_end_.attach_to(network_);
   far_end_.power_on();
   power_on_ns_ = network_.now_ns();
   bring_up(parts, [this](fieldbus::ModbusLine& line) { pump(network_, line, network_.now_ns()); });
-  cycle_.emplace(std::move(parts), session.settings, session.cell.limits, drained_after_every_cycle);
+  cycle_.emplace(std::move(parts), session_.settings, session_.cell.limits, drained_after_every_cycle);
 }
 
-void SimulatedLoop::put_in(const OwnParts& own, CycleParts& parts) {
+void SimulatedLoop::put_in(CycleParts& parts) {
   FarEnd far_end{far_end_, network_};
-  if (own.sensor) parts.sensor = own.sensor(far_end);
-  require_joints(own, session_.cell);
+  if (own_.sensor) parts.sensor = own_.sensor(far_end);
+  require_joints(own_, session_.cell);
   std::vector<DriveOnBus> drives;
   for (std::size_t axis = 0; axis < parts.drives.size(); ++axis) {
     const description::DriveDescription& there = session_.cell.drives[axis];
-    const auto made = own.drives.find(there.joint);
-    if (made == own.drives.end()) {
+    const auto made = own_.drives.find(there.joint);
+    if (made == own_.drives.end()) {
       drives.push_back(std::move(parts.drives[axis]));
       continue;
     }
@@ -118,31 +173,39 @@ void SimulatedLoop::put_in(const OwnParts& own, CycleParts& parts) {
   parts.drives = std::move(drives);
 }
 
-SessionTally SimulatedLoop::run(const LookAtCycle& look) {
+void SimulatedLoop::look_at_truth(std::int64_t t_k_ns) {
+  if (!first_cycle_ns_) first_cycle_ns_ = t_k_ns - power_on_ns_;
+  truth_ = far_end_.truth();
+  if (!exploded_after_s_ && !is_possible(truth_)) exploded_after_s_ = 1e-9 * static_cast<double>(t_k_ns - power_on_ns_);
+}
+
+SessionTally SimulatedLoop::run(const LookAtCycle& look, const SessionLength& length,
+                                const std::function<void(std::int64_t t_k_ns)>& before) {
   for (std::size_t i = 0; i < network_.bus_count(); ++i) {
     network_.simulated_bus(i).statistics().reset(network_.now_ns());
   }
-  sim::Truth truth;
   const SessionHooks hooks{[&](std::int64_t t_k_ns) {
-                             if (!first_cycle_ns_) first_cycle_ns_ = t_k_ns - power_on_ns_;
-                             truth = far_end_.truth();
+                             look_at_truth(t_k_ns);
+                             if (before) before(t_k_ns);
                            },
                            [&] {
                              CycleRecord record;
-                             while (cycle_->records().pop(record)) look(record, truth);
+                             while (cycle_->records().pop(record)) look(record, truth_);
                            }};
-  const SessionTally tally = run_session(*cycle_, network_, {session_.duration_s}, hooks);
+  const SessionTally tally = run_session(*cycle_, network_, length, hooks);
   for (std::size_t i = 0; i < network_.bus_count(); ++i) {
     bus_load_[network_.bus(i).name()] = network_.simulated_bus(i).load();
   }
   cycle_->shut_down();
+  network_.sleep_until(network_.now_ns() + last_words_ns);
   return tally;
 }
 
 QuietEnd run_quietly(const command_line::PreparedSession& session, const LookAtCycle& look) {
   SimulatedLoop loop(session);
   QuietEnd out;
-  out.end = loop.run(look).end;
+  loop.start();
+  out.end = loop.run(look, {session.duration_s}).end;
   const Cycle& cycle = loop.cycle();
   if (cycle.supervisor().faulted()) out.fault = fault_name(cycle.supervisor().report().fault);
   if (cycle.work() != nullptr) out.work = *cycle.work();
@@ -163,11 +226,6 @@ void pump(fieldbus::SimulatedCanNetwork& network, fieldbus::ModbusLine& line, st
   const std::int64_t earliest_ns = time_ns + std::llround(1e9 * line.exchange_s());
   const std::int64_t next_ns = std::max<std::int64_t>(line.step(time_ns), earliest_ns);
   network.events().schedule(next_ns, [&network, &line](std::int64_t t_ns) { pump(network, line, t_ns); });
-}
-
-bool is_possible(const sim::Truth& truth) noexcept {
-  return truth.X_WT.matrix().allFinite() && truth.acceleration_W.allFinite() &&
-         truth.velocity_W.norm() < impossible_m_per_s;
 }
 
 void refuse_explosion(double since_power_on_s) {

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/cycle/cycle.hpp"
@@ -21,6 +22,8 @@
 #include "models/geometry/geometric_algorithm.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "sim/cell/simulated_cell.hpp"
+#include "sim/devices/device_fault.hpp"
+#include "sim/devices/enabling_switch.hpp"
 #include "sim/physics/plant.hpp"
 
 namespace proxarm::controller {
@@ -44,25 +47,44 @@ struct OwnParts {
   std::map<std::string, MakeDrive> drives;  // by joint; frames of no bus come to them
 };
 
-// Throws SetupError for an arm whose tool can't move in space, and for a lookahead: that steps a second proxy through a
-// scene which it compiles anew, and somebody's own 𝒢 is there only once.
+// Throws SetupError for an arm whose tool can't move in space, for a tool with a shape, and for a lookahead: that steps
+// a second proxy through a scene which it compiles anew, and somebody's own 𝒢 is there only once.
 void require_own_world_fits(const command_line::PreparedSession& session);
 
 // Sees each cycle's record, and the truth at its SYNC.
 using LookAtCycle = std::function<void(const CycleRecord&, const sim::Truth&)>;
 
+// What is simulated: the session's own cell, or that of --arm, which is wired as it is. Throws SetupError.
+command_line::PreparedSession simulated_arm(const command_line::PreparedSession& session,
+                                            const command_line::RunOptions& options);
+
+// The far end, where it isn't just what the session takes it for.
+struct SimulatedFarEnd {
+  const command_line::PreparedSession* arm = nullptr;  // simulated_arm(); null: the session
+  std::vector<sim::DeviceFault> faults;                // of its devices
+  std::vector<sim::PressedSpan> enabling;              // of its enabling switch
+};
+
 class SimulatedLoop {
  public:
-  // Throws SetupError where the session can't begin. `session` must outlive the loop. Several loops may run at once, in
-  // different threads.
-  explicit SimulatedLoop(const command_line::PreparedSession& session, const OwnParts& own = {});
+  // Throws SetupError. `session` must outlive the loop. Several loops may run at once, in different threads.
+  explicit SimulatedLoop(const command_line::PreparedSession& session, const OwnParts& own = {},
+                         const SimulatedFarEnd& far_end = {});
   SimulatedLoop(const SimulatedLoop&) = delete;
   SimulatedLoop& operator=(const SimulatedLoop&) = delete;
 
-  // Once: until the session's duration has been rendered, a fault, or request_stop() of its cycle.
-  SessionTally run(const LookAtCycle& look);
+  // Powers the devices on and brings them up. Throws SetupError where the session can't begin.
+  void start();
+  // Once, after start(): until the session has lasted as long as it is to, a fault, or request_stop() of its cycle.
+  // `before` is called before each cycle, at its time.
+  SessionTally run(const LookAtCycle& look, const SessionLength& length,
+                   const std::function<void(std::int64_t t_k_ns)>& before = {});
 
-  [[nodiscard]] Cycle& cycle() noexcept { return *cycle_; }
+  [[nodiscard]] fieldbus::SimulatedCanNetwork& network() noexcept { return network_; }
+  [[nodiscard]] Cycle& cycle() noexcept { return *cycle_; }  // after start()
+  // What no arm can do, since its simulation has become unstable: when, in the time since power on. For
+  // refuse_explosion().
+  [[nodiscard]] std::optional<double> exploded_after_s() const noexcept { return exploded_after_s_; }
   [[nodiscard]] std::optional<std::int64_t> first_cycle_ns() const noexcept {
     return first_cycle_ns_;
   }  // since power on
@@ -70,15 +92,19 @@ class SimulatedLoop {
   [[nodiscard]] const std::map<std::string, double>& bus_load() const noexcept { return bus_load_; }
 
  private:
-  void put_in(const OwnParts& own, CycleParts& parts);
+  void put_in(CycleParts& parts);
+  void look_at_truth(std::int64_t t_k_ns);
 
   const command_line::PreparedSession& session_;
+  OwnParts own_;
   fieldbus::SimulatedCanNetwork network_;
   sim::SimulatedCell far_end_;
   scenes::CompiledScene scene_;
   std::optional<Cycle> cycle_;
+  sim::Truth truth_;  // at the present cycle's SYNC
   std::map<std::string, double> bus_load_;
   std::int64_t power_on_ns_ = 0;
+  std::optional<double> exploded_after_s_;
   std::optional<std::int64_t> first_cycle_ns_;
 };
 
@@ -96,8 +122,7 @@ void add_truth(CycleRecord& record, const sim::Truth& truth);
 // A Modbus line's worker on the virtual clock, from now on: an exchange takes as long as it does on the wire.
 void pump(fieldbus::SimulatedCanNetwork& network, fieldbus::ModbusLine& line, std::int64_t time_ns);
 
-// Whether an arm can move so; and what is thrown where it can't: no fault of the session.
-bool is_possible(const sim::Truth& truth) noexcept;
+// An arm that moves as none can: no fault of the session.
 [[noreturn]] void refuse_explosion(double since_power_on_s);
 
 }  // namespace proxarm::controller

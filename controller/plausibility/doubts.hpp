@@ -12,6 +12,7 @@
 #include "models/arm/arm.hpp"
 #include "models/description/cell.hpp"
 #include "models/description/hand.hpp"
+#include "models/description/modbus_drive.hpp"
 #include "scenes/format/scene.hpp"
 
 namespace proxarm::controller {
@@ -20,6 +21,9 @@ namespace proxarm::controller {
 std::vector<std::string> cell_doubts(const description::Cell& cell, const models::Arm& arm);
 
 std::vector<std::string> hand_doubts(const description::HandDescription& hand);
+
+// Register numbers of a map that look as if they were counted from 40001, as in manuals.
+std::vector<std::string> register_doubts(const description::ModbusDriveDescription& drive);
 
 // start_W: the tool's place at the start, m. reach_m: an upper bound of the distance of any of the arm's points from
 // the arm's base.

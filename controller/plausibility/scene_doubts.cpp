@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "controller/plausibility/doubts.hpp"
@@ -14,7 +15,7 @@ using models::Vec3;
 using Lines = std::vector<std::string>;
 
 // Number of the arm's reaches. An object that is further from the tool's start than this is never touched.
-constexpr double far_reaches = 10.0;
+constexpr double far_reaches = 4.0;
 const Expected friction{0.0, 3.0, "", {{"percent", 1e-2}}};
 
 // Returns a lower bound of the distance to a shape's surface; absent for a mesh, since meshes have their own report.
@@ -83,8 +84,17 @@ class SceneDoubts {
     if (!object.motion) return;
     value("motion.velocity_m_per_s", object.motion->velocity_m_per_s.norm(), {0.0, 5.0, "m/s", {units::mm_per_s}});
     value("motion.amplitude_m", object.motion->amplitude_m.norm(), {0.0, 5.0, "m", {units::mm}});
+    judge_swing(*object.motion);
     value("motion.turn_rad_per_s", std::abs(object.motion->turn_rad_per_s),
           {0.0, 20.0, "rad/s", {units::degrees_per_s}});
+  }
+
+  // How fast a swing moves the object at most.
+  void judge_swing(const scenes::Motion& motion) {
+    const double speed_m_per_s = 2.0 * std::numbers::pi * motion.frequency_Hz * motion.amplitude_m.norm();
+    judge(where_ + "motion.frequency_Hz", motion.frequency_Hz,
+          {"Hz", speed_m_per_s, 1.0, "by which it moves at " + description::rounded_text(speed_m_per_s) + " m/s"},
+          {0.0, 5.0, "m/s", {{"swings/min", 1.0 / 60.0}}}, lines_);
   }
 
   const scenes::Scene& scene_;

@@ -6,7 +6,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <memory>
@@ -22,7 +22,6 @@
 #include "controller/signals/contact_columns.hpp"
 #include "controller/signals/derived_signals.hpp"
 #include "controller/signals/signal_columns.hpp"
-#include "models/base/quantity.hpp"
 #include "models/packed/packed.hpp"
 #include "scenes/compiler/clearances.hpp"
 #include "scenes/compiler/compile.hpp"
@@ -156,75 +155,88 @@ class World {
 
 // ---- Simulated sessions
 
-// A 𝒢 that is a Python function of kappa, p and q. What it raises ends the session.
-class PythonWorld final : public GeometricAlgorithm<3> {
+// A 𝒢 that is a Python function of kappa, p and q. It returns where the proxy goes, or that and its contacts
+// (proxarm.Contact). What it raises ends the session.
+class PythonWorld final : public OwnWorld {
  public:
   PythonWorld(py::function function, Session& session) : function_(std::move(function)), session_(session) {}
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override {
-    pressed_ = false;
+    contacts_.clear();
+    points_W_.clear();
     if (raised_) return q;
     try {
       const py::gil_scoped_acquire held;
-      const Vec3 to = vector_of<3>(function_(K, array_of<3>(p), array_of<3>(q)), "the world's answer");
-      if (!to.allFinite()) throw py::value_error("the world's answer: expected finite numbers");
-      contact_[0].normal = (to - p).stableNormalized();
-      pressed_ = to != p;
-      return to;
+      return answer(function_(K, array_of<3>(p), array_of<3>(q)));
     } catch (...) {
       raised_ = std::current_exception();
       session_.stop();
       return q;
     }
   }
-  // What holds the proxy back presses along the way by which it does.
-  [[nodiscard]] std::span<const models::Contact<3>> contacts() const noexcept override {
-    return {contact_.data(), pressed_ ? 1U : 0U};
-  }
+  [[nodiscard]] std::span<const models::Contact<3>> contacts() const noexcept override { return contacts_; }
+  [[nodiscard]] std::span<const Vec3> contact_points_W() const noexcept override { return points_W_; }
+  // In the order in which they were first touched.
+  [[nodiscard]] std::vector<std::string> objects() const override { return objects_; }
   [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
   [[nodiscard]] const std::exception_ptr& raised() const noexcept { return raised_; }
 
  private:
+  Vec3 answer(const py::object& given) {
+    const bool has_contacts = py::isinstance<py::tuple>(given) && py::len(given) == 2;
+    const py::object place = has_contacts ? py::object(given[py::int_(0)]) : given;
+    const Vec3 to = vector_of<3>(place, "the world's answer");
+    if (!to.allFinite()) throw py::value_error("the world's answer: expected finite numbers");
+    if (has_contacts) {
+      for (const py::handle contact : given[py::int_(1)]) add(contact, to);
+    }
+    return to;
+  }
+  void add(py::handle contact, const Vec3& proxy_W) {
+    models::Contact<3> added;
+    added.normal = vector_of<3>(contact.attr("normal"), "a contact's normal").stableNormalized();
+    if (!(added.normal.norm() > 0.5)) throw py::value_error("a contact's normal: expected a direction");
+    added.slips = py::cast<bool>(contact.attr("slips"));
+    added.object = number_of(py::cast<std::string>(contact.attr("object")));
+    const py::object point = contact.attr("point");
+    const Vec3 point_W = point.is_none() ? proxy_W : vector_of<3>(point, "a contact's point");
+    if (!point_W.allFinite()) throw py::value_error("a contact's point: expected finite numbers");
+    contacts_.push_back(added);
+    points_W_.push_back(point_W);
+  }
+  std::int32_t number_of(const std::string& object) {
+    const auto found = std::find(objects_.begin(), objects_.end(), object);
+    const auto number = static_cast<std::int32_t>(found - objects_.begin());
+    if (found == objects_.end()) objects_.push_back(object);
+    return number;
+  }
+
   py::function function_;
   Session& session_;
-  std::array<models::Contact<3>, 1> contact_;
-  bool pressed_ = false;
+  std::vector<std::string> objects_;
+  std::vector<models::Contact<3>> contacts_;
+  std::vector<Vec3> points_W_;
   std::exception_ptr raised_;
 };
 
-// A number in SI units, or text with its unit as the command line takes it.
-using Quantity = std::variant<double, std::string>;
-
-template <typename Parse>
-double value_of(const Quantity& given, const Parse& parse, const char* option) {
-  if (const auto* text = std::get_if<std::string>(&given)) return parse(*text, option);
-  return std::get<double>(given);
-}
-
-SessionOptions options_of(const std::string& cell, const std::string& scene, const std::string& hand,
-                          const std::optional<Quantity>& mass, const std::optional<Quantity>& timestep,
-                          const Quantity& duration, const Quantity& damping, const Quantity& spring, int order,
-                          const std::string& lookahead, bool force_unstable, const std::string& bus) {
-  if (bus != "sim") {
-    throw SetupError(
-        {.key = "bus",
-         .found = description::in_quotes(bus),
-         .expected = "sim: Python has no place in the cycle of a real session",
-         .advice = "proxarm.run(\"--bus\", …) runs one as a process of its own, proxarm.Live talks to it"});
-  }
+// Options as Python has them: numbers, text, True or False, or a list of texts; None is as if it weren't there.
+SessionOptions options_of(const py::dict& given) {
   SessionOptions options;
-  options.cell = cell;
-  options.scene = scene;
-  options.hand = hand;
-  if (mass) options.mass_kg = value_of(*mass, description::parse_mass, "--mass");
-  if (timestep) options.timestep_s = value_of(*timestep, description::parse_duration, "--timestep");
-  options.duration_s = value_of(duration, description::parse_duration, "--duration");
-  options.damping_Ns_per_m = value_of(damping, description::parse_damping, "--damping");
-  options.spring_N_per_m = value_of(spring, description::parse_stiffness, "--spring");
-  options.order = order;
-  options.lookahead = lookahead;
-  options.force_unstable = force_unstable;
+  for (const auto& item : given) {
+    const py::handle value = item.second;
+    const auto add = [&](OptionValue taken) { options.add({py::cast<std::string>(item.first), std::move(taken)}); };
+    if (value.is_none()) continue;
+    if (py::isinstance<py::bool_>(value)) {
+      add(py::cast<bool>(value));
+    } else if (py::isinstance<py::str>(value)) {
+      add(py::cast<std::string>(value));
+    } else if (py::isinstance<py::list>(value)) {
+      add(py::cast<std::vector<std::string>>(value));
+    } else {
+      add(py::cast<double>(value));
+    }
+  }
   return options;
 }
 
@@ -286,7 +298,7 @@ class Rows {
 
 constexpr std::uint64_t cycles_between_looks = 256;  // whether somebody has pressed Ctrl-C
 
-// Returns the summary as JSON, the signals and the contacts.
+// Returns the summary as JSON, the signals, the contacts and the names of the objects.
 py::tuple run_session(Session& session, const std::optional<py::function>& world,
                       const std::optional<py::function>& hand) {
   std::optional<PythonWorld> python_world;
@@ -315,7 +327,7 @@ py::tuple run_session(Session& session, const std::optional<py::function>& world
     contacts = rows.contacts();
   }
   if (python_world && python_world->raised()) std::rethrow_exception(python_world->raised());
-  return py::make_tuple(summary, columns_of(std::move(columns)), columns_of(std::move(contacts)));
+  return py::make_tuple(summary, columns_of(std::move(columns)), columns_of(std::move(contacts)), session.objects());
 }
 
 }  // namespace
@@ -352,13 +364,10 @@ PYBIND11_MODULE(_proxarm, module) {
       "_bare", [](double, py::handle, py::handle) {}, "What a call costs that does nothing.");
 
   py::class_<Session>(module, "_Session")
-      .def(py::init([](const std::string& cell, const std::string& scene, const std::string& hand,
-                       const std::optional<Quantity>& mass, const std::optional<Quantity>& timestep,
-                       const Quantity& duration, const Quantity& damping, const Quantity& spring, int order,
-                       const std::string& lookahead, bool force_unstable, const std::string& bus) {
-        return std::make_unique<Session>(options_of(cell, scene, hand, mass, timestep, duration, damping, spring, order,
-                                                    lookahead, force_unstable, bus));
-      }))
+      .def(py::init([](const py::dict& options) { return std::make_unique<Session>(options_of(options)); }))
+      .def("surprises", &Session::surprises)
+      .def("ask", &Session::ask, py::call_guard<py::gil_scoped_release>())
+      .def("stop", &Session::stop)
       .def("run", &run_session);
   module.def("_read_table",
              [](const std::string& file, const std::vector<std::string>& wanted, const std::vector<std::string>& text) {

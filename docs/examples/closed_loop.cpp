@@ -5,7 +5,7 @@
 #include "controller/library/session.hpp"
 
 int main() {
-  proxarm::Session session({.scene = "scenes/wall.yaml", .mass_kg = 5.0, .duration_s = 6.0});
+  proxarm::Session session({{"scene", "scenes/wall.yaml"}, {"mass", 5.0}, {"duration", 6.0}});
   double deepest_m = 0.0;
   const proxarm::Summary summary =
       session.run([&](const proxarm::CycleRecord& cycle) { deepest_m = std::max(deepest_m, -cycle.tool_clearance_m); });

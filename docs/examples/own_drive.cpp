@@ -82,7 +82,7 @@ class OwnDrive final : public fieldbus::CyclicDrive {
 };
 
 int main() try {
-  proxarm::Session session({.duration_s = 6.0});
+  proxarm::Session session({{"duration", 6.0}});
   const double period_s = session.prepared().settings.period_s;
   session.set_drive("axis_6", [=](proxarm::controller::FarEnd& far_end, std::size_t axis,
                                   const proxarm::description::DriveDescription& description) {

@@ -41,7 +41,7 @@ class OwnSensor final : public proxarm::fieldbus::ForceSensor {
 };
 
 int main() try {
-  proxarm::Session session({.duration_s = 6.0});
+  proxarm::Session session({{"duration", 6.0}});
   session.set_sensor([](proxarm::controller::FarEnd& far_end) { return std::make_unique<OwnSensor>(far_end.cell); });
   const proxarm::Summary summary = session.run();
   std::printf("%s", proxarm::summary_text(summary).c_str());

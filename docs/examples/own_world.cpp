@@ -4,13 +4,15 @@
 #include <cstdio>
 #include <exception>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "controller/library/session.hpp"
 
 using proxarm::Vec3;
 
 // All points within `tube_m_` of a circle about the x axis through `centre_`.
-class Torus final : public proxarm::GeometricAlgorithm<3> {
+class Torus final : public proxarm::OwnWorld {
  public:
   // 𝒢: the point outside of the torus that is nearest to p. It doesn't depend on K, so that Assumption 1 holds.
   Vec3 operator()(double /*K*/, const Vec3& p, const Vec3& q) noexcept override {
@@ -25,6 +27,7 @@ class Torus final : public proxarm::GeometricAlgorithm<3> {
   [[nodiscard]] std::span<const proxarm::models::Contact<3>> contacts() const noexcept override {
     return {contact_.data(), pressed_ ? 1U : 0U};
   }
+  [[nodiscard]] std::vector<std::string> objects() const override { return {"torus"}; }
   [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
   [[nodiscard]] double distance_m(const Vec3& p) const noexcept { return (p - nearest_on_circle(p)).norm() - tube_m_; }
@@ -43,7 +46,7 @@ class Torus final : public proxarm::GeometricAlgorithm<3> {
 
 int main() try {
   Torus torus;
-  proxarm::Session session({.duration_s = 6.0});
+  proxarm::Session session({{"duration", 6.0}});
   double nearest_m = std::numeric_limits<double>::infinity();
   const proxarm::Summary summary = session.set_world(torus).run([&](const proxarm::CycleRecord& cycle) {
     nearest_m = std::min(nearest_m, torus.distance_m(proxarm::controller::vec3(cycle.proxy_W_m)));

@@ -6,11 +6,13 @@ centre, circle_m, tube_m = numpy.array([0.94, 0.0, 0.5]), 0.1, 0.04
 
 
 def torus(kappa, p, q):
-    """The point outside of the torus that is nearest to p."""
+    """The point outside of the torus that is nearest to p, and what touches there."""
     aside = numpy.array([0.0, *(p - centre)[1:]])
     on_circle = centre + circle_m * aside / numpy.linalg.norm(aside)
     way = p - on_circle
-    return p if numpy.linalg.norm(way) >= tube_m else on_circle + tube_m * way / numpy.linalg.norm(way)
+    if numpy.linalg.norm(way) >= tube_m:
+        return p
+    return on_circle + tube_m * way / numpy.linalg.norm(way), [proxarm.Contact(normal=way, object="torus")]
 
 
 def hand(time_s, position, velocity):

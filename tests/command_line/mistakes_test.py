@@ -84,6 +84,39 @@ CELL = [
     ("mode: csp", "mode: csv-like"),
     ("arms/arm150.urdf", "arms/arm15.urdf", "urdf"),
     ("joint: axis_1", "joint: axis1"),
+    ("gear_damping_Nms_per_rad: 130", "gear_damping_Nms_per_rad: 0.130"),
+    ("gear_damping_Nms_per_rad: 130", "gear_damping_Nms_per_rad: 130000"),
+    ("      gear_damping_Nms_per_rad: 130", "      gear_damping_Nms_per_rad: 0.13", "simulation.gear_damping_Nms_per_rad"),
+    ("viscous_friction_Nms_per_rad: 20", "viscous_friction_Nms_per_rad: 20000"),
+    ("coulomb_friction_Nm: 25", "coulomb_friction_Nm: 2500"),
+    ("backlash_rad: 0", "backlash_rad: 1"),
+    ("      max_torque_Nm: 2500", "      max_torque_Nm: 2.5", "simulation.max_torque_Nm"),
+    ("position_gain_per_s: 350", "position_gain_per_s: 0.35"),
+    ("velocity_bandwidth_Hz: 200", "velocity_bandwidth_Hz: 0.2"),
+    ("velocity_feedforward: 1", "velocity_feedforward: 100"),
+    ("servo_rate_Hz: 4000", "servo_rate_Hz: 4"),
+    ("device_type: 0x00020192", "device_type: 20192"),
+    ("rotor_inertia_kg_m2: 58.0", "rotor_inertia_kg_m2: 58000"),
+    ("rotor_inertia_kg_m2: 58.0", "rotor_inertia_kg_m2: 0.0258"),
+    ("max_torque_Nm: 2500", "max_torque_Nm: 16"),
+    ("gravity_W_m_per_s2: [0, 0, -9.80665]", "gravity_W_m_per_s2: [0, -9.80665, 0]"),
+    ("gravity_W_m_per_s2: [0, 0, -9.80665]", "gravity_W_m_per_s2: -9.80665"),
+    ("mass_kg: 0.25", "mass_kg: 0"),
+    ("mass_kg: 0.25", "mass_kg: 0,25"),
+    ("mass_kg: 0.25", "mass_kg: 0.25 kg"),
+    ("inertia_kg_m2: [3.25e-4, 3.25e-4, 5.0e-5", "inertia_kg_m2: [3.25e-7, 3.25e-7, 5.0e-8"),
+    ("inertia_kg_m2: [3.25e-4, 3.25e-4, 5.0e-5", "inertia_kg_m2: [3.25e-4, 5e-5, 5.0e-5"),
+    ("centre_of_mass_S_m: [0, 0, 0.06]", "centre_of_mass_S_m: [0, 0, 0.6]"),
+    ("handle_S: {position_m: [0, 0, 0.1]", "handle_S: {position_m: [0, 0, 10]"),
+    ("noise_Nm: 0.001", "noise_Nm: 1"),
+    ("sample_rate_Hz: 7147", "sample_rate_Hz: 7147\n  delay_s: 2", "delay_s"),
+    ("leash_m: 0.02", "leash_m: 0.02\n  max_turn_rad: 0.0001", "max_turn_rad"),
+    ("leash_m: 0.02", "leash_m: 0.00002"),
+    ("leash_m: 0.02", "leash_m: 0.02\n  max_elbow_speed_m_per_s: 500", "max_elbow_speed_m_per_s"),
+    ("max_force_N: 200", "max_force_N: 2"),
+    ("default_mass_kg: 4", "default_mass_kg: 4\ndefault_damping_Ns_per_m: 50000", "default_damping_Ns_per_m"),
+    ("default_period_s: 0.001", "default_period_s: 1ms"),
+    ("node: 2\n", "node: 1\n"),
 ]
 SCENE = [
     ("friction: 0.3", "friction: 30"),
@@ -96,6 +129,9 @@ SCENE = [
     ("friction: 0.3}", "friction: 0.3, motion: {velocity_m_per_s: [100, 0, 0]}}", "velocity_m_per_s"),
     ("friction: 0.3}", "friction: 0.3, motion: {swing: {amplitude_m: [100, 0, 0], frequency_Hz: 0.2}}}", "amplitude_m"),
     ("plane:", "plan:", "plan"),
+    ("friction: 0.3", "friction: 0,3"),
+    ("point_m: [0.9, 0, 0.6]", "point_m: [9, 0, 6]", "wall"),
+    ("friction: 0.3}", "friction: 0.3, motion: {swing: {amplitude_m: [0.05, 0, 0], frequency_Hz: 200}}}", "frequency_Hz"),
 ]
 HAND = [
     ("mass_kg: 1.0", "mass_kg: 1000"),
@@ -104,6 +140,9 @@ HAND = [
     ("damping_Ns_per_m: 20", "damping_Ns_per_m: 20\nmax_force_N: 0.06", "max_force_N"),
     ("offset_m: [0.18, 0, 0]", "offset_m: [180, 0, 0]"),
     ("time_s: 2.7", "time_s: 2.4"),
+    ("time_s: 0.5", "time_s: 500"),
+    ("offset_m: [0.18, 0, 0]", "offset_m: [18, 0, 0]"),
+    ("mass_kg: 1.0", "mass_kg: 100"),
     ("offset_m: [0.18, 0, 0]}", "offset_m: [0.18, 0, 0], turn_rad: [0, 0, 30]}", "turn_rad"),
 ]
 
@@ -162,6 +201,21 @@ class Mistakes(unittest.TestCase):
     def test_each_in_a_hand_is_named_when_it_is_used(self):
         self.assertEqual([], self.missed(text_of("sim/hands/touch.yaml"), HAND,
                                          lambda file: ("run", "--hand", file, "--duration", "10ms", "--no-plot")))
+
+    def test_registers_that_count_from_40001_are_doubted(self):
+        right = text_of("models/drives/generic_absolute.yaml")
+        counted = {"register: 0\n": "register: 40001\n", "register: 16\n": "register: 40017\n", "{register: 17}": "{register: 40018}",
+                   "{register: 16,": "{register: 40017,"}
+        for found, written in counted.items():
+            self.assertIn(found, right)
+            right = right.replace(found, written)
+        file = os.path.join(self.folder.name, "registers.yaml")
+        with open(file, "w") as out:
+            out.write(right)
+        status, said = answer("check", file)
+        self.assertEqual(status, 0)
+        for key, number in (("command.register", 0), ("feedback.register", 16), ("feedback.position.register", 17)):
+            self.assertRegex(said, rf"{key}: found 400\d\d, .* counts from 40001, write {number}\n")
 
     def test_nothing_is_said_of_what_is_shipped(self):
         cells = [os.path.join(ROOT, "models/cells", name) for name in sorted(os.listdir(os.path.join(ROOT, "models/cells")))

@@ -178,8 +178,12 @@ class NewCell(ProgramTest):
         self.assertRegex(told, r"joint joint_1: its effort of 0.12 Nm can't .*: \d+ is taken")
         for joint in (2, 6):
             self.assertNotIn(f"joint_{joint}: its effort", told)
+        # An effort of 0 was replaced without a word.
+        self.assertRegex(told, r"the URDF says no effort of joint_3, joint_4, joint_5: \d+ Nm, \S+ Nm, \S+ Nm are taken")
         cell = (self.folder / "mine/cell.yaml").read_text()
         drives = yaml.safe_load(cell)["drives"]
+        for key in yaml.safe_load(cell)["tool"]["inertia_kg_m2"]:
+            self.assertIsInstance(key, (float, int), "PyYAML takes 5e-05 for a text")
         number = lambda drive, key: float(drives[drive][key])
         self.assertGreater(number(0, "max_torque_Nm"), 50)
         self.assertEqual(number(1, "max_torque_Nm"), 700)

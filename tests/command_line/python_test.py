@@ -242,7 +242,7 @@ class Sessions(ProgramTest):
         stop_m = 0.75
 
         def wall(kappa, p, q):
-            return [min(p[0], stop_m), p[1], p[2]]
+            return [min(p[0], stop_m), p[1], p[2]], [proxarm.Contact([-1, 0, 0])] * int(p[0] > stop_m)
 
         def hand(time_s, position, velocity):  # not before the sensor is tared
             return 5 * (time_s > 0.5) - 20 * velocity[0], -20 * velocity[1], -20 * velocity[2]
@@ -283,7 +283,7 @@ class Sessions(ProgramTest):
             proxarm.World(str(self.written("bad.yaml", "objects:\n  - plane: {friction: -1}\n")))
         self.assertEqual(caught.exception.line, 2)
         self.assertTrue(caught.exception.file.endswith("bad.yaml"))
-        with self.assertRaisesRegex(proxarm.SetupError, "cycle of a real session"):
+        with self.assertRaisesRegex(proxarm.SetupError, "a real arm is run by the program alone"):
             proxarm.Session(bus="can0")
 
     def test_other_threads_go_on_meanwhile(self):

@@ -29,8 +29,8 @@ class Reference(ProgramTest):
             self.assertIn(function, session)
         self.assertIn("It must outlive the session.", session)
         # Behind a member, and going on in the line below.
-        options = pages["structproxarm_1_1SessionOptions.html"]
-        self.assertIn("empty: the cell's; by its grip and its mass stability is judged", options)
+        parts = pages["structproxarm_1_1controller_1_1OwnParts.html"]
+        self.assertIn("in W; must outlive the loop", parts)
         # The first sentence of each header.
         whole = " ".join(pages.values())
         for header in headers:

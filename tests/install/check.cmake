@@ -12,6 +12,17 @@ endfunction()
 
 run(${CMAKE_COMMAND} --install ${build} --prefix ${folder}/prefix)
 
+# What isn't built is named before anything is copied. The build's own archive is put aside for as long.
+file(REMOVE_RECURSE ${folder}/half)
+file(RENAME ${build}/models/base/libproxarm_models_base.a ${folder}/aside.a)
+execute_process(COMMAND ${CMAKE_COMMAND} --install ${build} --prefix ${folder}/half RESULT_VARIABLE status
+                OUTPUT_VARIABLE output ERROR_VARIABLE output)
+file(RENAME ${folder}/aside.a ${build}/models/base/libproxarm_models_base.a)
+string(FIND "${output}" "libproxarm_models_base.a isn't built" said)
+if(status EQUAL 0 OR said EQUAL -1 OR EXISTS ${folder}/half)
+  message(FATAL_ERROR "half a build was installed, or it wasn't said why not (${status}):\n${output}")
+endif()
+
 get_filename_component(source ${CMAKE_CURRENT_LIST_DIR}/../.. ABSOLUTE)
 # Docs, manual pages and completion.
 file(GLOB_RECURSE docs RELATIVE ${source} ${source}/docs/*.md ${source}/docs/*.png ${source}/docs/*.svg)

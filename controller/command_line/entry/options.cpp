@@ -1,6 +1,26 @@
 #include "controller/command_line/entry/options.hpp"
 
+#include <algorithm>
+
 namespace proxarm::command_line {
+
+std::string options_mistake(const CLI::App& command, const std::vector<std::string>& words,
+                            const CLI::ParseError& error) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  std::string message = error.what();
+  for (const std::string& word : words) {
+    const std::string name = word.substr(0, word.find('='));
+    if (word.substr(0, 2) != "--" || std::find(known.begin(), known.end(), name) != known.end()) continue;
+    message = "unknown option " + description::in_quotes(name);
+    const std::string near = description::nearest(name, known);
+    if (!near.empty()) message += "; did you mean " + near + "?";
+    break;
+  }
+  return message;
+}
 
 CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_t)> store) {
   return [option = std::move(option), store = std::move(store)](const CLI::results_t& words) {

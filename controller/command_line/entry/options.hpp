@@ -39,6 +39,11 @@ CLI::callback_t choice(std::string option, std::map<std::string, Value> choices,
   };
 }
 
+// Returns CLI11's message about options as one line, with the option of `command` that is spelt most like the wrong
+// one.
+std::string options_mistake(const CLI::App& command, const std::vector<std::string>& words,
+                            const CLI::ParseError& error);
+
 // Returns a parser of a whole number in decimal digits.
 CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_t)> store);
 

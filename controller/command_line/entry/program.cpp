@@ -1,15 +1,14 @@
 #include "controller/command_line/entry/program.hpp"
 
-#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <iostream>
 #include <new>
 
 #include "controller/command_line/entry/exit_status.hpp"
+#include "controller/command_line/entry/options.hpp"
 #include "controller/command_line/entry/standard_streams.hpp"
 #include "models/base/setup_error.hpp"
-#include "models/base/text.hpp"
 
 namespace proxarm::command_line {
 
@@ -29,20 +28,7 @@ int run_program(const std::function<int()>& run) noexcept {
 
 int refuse_options(const CLI::App& command, const std::string& called, const std::vector<std::string>& words,
                    const CLI::ParseError& error) {
-  std::vector<std::string> known;
-  for (const CLI::Option* option : command.get_options()) {
-    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
-  }
-  std::string message = error.what();
-  for (const std::string& word : words) {
-    const std::string name = word.substr(0, word.find('='));
-    if (word.substr(0, 2) != "--" || std::find(known.begin(), known.end(), name) != known.end()) continue;
-    message = "unknown option " + description::in_quotes(name);
-    const std::string near = description::nearest(name, known);
-    if (!near.empty()) message += "; did you mean " + near + "?";
-    break;
-  }
-  std::fprintf(stderr, "proxarm: %s; see %s --help\n", message.c_str(), called.c_str());
+  std::fprintf(stderr, "proxarm: %s; see %s --help\n", options_mistake(command, words, error).c_str(), called.c_str());
   return set_up_mistake;
 }
 

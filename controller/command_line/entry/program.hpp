@@ -13,8 +13,8 @@ namespace proxarm::command_line {
 // flushes standard output.
 int run_program(const std::function<int()>& run) noexcept;
 
-// Prints CLI11's message about wrong options as one line, with the option of `command` that is spelt most like the
-// wrong one. `called` is the command as the user typed it, such as "proxarm run". Returns the exit status.
+// Prints options_mistake(). `called` is the command as the user typed it, such as "proxarm run". Returns
+// the exit status.
 int refuse_options(const CLI::App& command, const std::string& called, const std::vector<std::string>& words,
                    const CLI::ParseError& error);
 

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/live/session_status.hpp"
@@ -414,17 +416,19 @@ std::string change(controller::Cycle& cycle, LiveParameters& parameters, const s
 
 }  // namespace
 
+void require_changeable(const PreparedSession& session, const std::string& key) {
+  if (!session.impedance()) return;
+  throw SetupError(
+      {.key = key,
+       .found = "the impedance type",
+       .expected =
+           "--scheme admittance: mass, damping and spring are the proxy's, and torques are made for one timestep"});
+}
+
 void require_changes(const PreparedSession& session, const RunOptions& options) {
-  const bool asked = !options.changes.empty() || !options.control.empty() || !options.orders.empty();
-  if (session.impedance() && asked) {
-    throw SetupError(
-        {.key = !options.changes.empty()  ? "--set"
-                : !options.orders.empty() ? "--do"
-                                          : "--control",
-         .found = "the impedance type",
-         .expected =
-             "--scheme admittance: mass, damping and spring are the proxy's, and torques are made for one timestep"});
-  }
+  if (!options.changes.empty()) require_changeable(session, "--set");
+  if (!options.orders.empty()) require_changeable(session, "--do");
+  if (!options.control.empty()) require_changeable(session, "--control");
   (void)script_of(options.changes, session, options);
   (void)scheduled_orders(options.orders);
   if (!options.control.empty()) require_control_path(control_path(options));
@@ -445,21 +449,35 @@ std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::
   return idle;
 }
 
-std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
-                                            const RunOptions& options, const controller::BoxReader& box) {
+void schedule_changes(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options) {
   Script script = script_of(options.changes, session, options);
   cycle.changes().schedule(std::move(script.changes));
   cycle.timesteps().schedule(std::move(script.timesteps));
   cycle.commands().schedule(scheduled_orders(options.orders));
+}
+
+ControlHandlers control_handlers(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options,
+                                 const controller::BoxReader& box) {
+  // Each ring of the cycle has one writer at a time. An order waits for no change that is being judged.
+  struct Writers {
+    std::mutex orders, changes;
+    LiveParameters parameters;
+  };
+  const std::shared_ptr<Writers> writers(new Writers{{}, {}, LiveParameters(session, options)});
+  return {[&cycle, &box, &session, writers](const std::string& line) {
+            if (auto status = session_status(line, box, session)) return status;
+            const std::lock_guard<std::mutex> one(writers->orders);
+            return obey(cycle, line);
+          },
+          [&cycle, writers](const std::string& line) {
+            const std::lock_guard<std::mutex> one(writers->changes);
+            return change(cycle, writers->parameters, line);
+          }};
+}
+
+std::unique_ptr<ControlSocket> control_socket(const RunOptions& options, ControlHandlers handlers) {
   if (options.control.empty()) return nullptr;
-  const auto parameters = std::make_shared<LiveParameters>(session, options);
-  return std::make_unique<ControlSocket>(
-      control_path(options),
-      ControlHandlers{[&cycle, &box, &session](const std::string& line) {
-                        const auto status = session_status(line, box, session);
-                        return status ? status : obey(cycle, line);
-                      },
-                      [&cycle, parameters](const std::string& line) { return change(cycle, *parameters, line); }});
+  return std::make_unique<ControlSocket>(control_path(options), std::move(handlers));
 }
 
 }  // namespace proxarm::command_line

@@ -49,6 +49,9 @@ class LiveParameters {
   std::uint32_t asked_timesteps_ = 0;
 };
 
+// Throws SetupError that names `key` if the session takes neither changes nor orders.
+void require_changeable(const PreparedSession& session, const std::string& key);
+
 // Checks the options --set, --do and --control before a bus is opened. Throws SetupError.
 void require_changes(const PreparedSession& session, const RunOptions& options);
 
@@ -62,10 +65,15 @@ struct IdleChange {
 // function after the session.
 std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::vector<std::string>& texts);
 
-// Schedules the changes and orders of the session's script. Opens the control socket if the options ask for one;
-// otherwise returns null. The socket reads the session's status from `box`. Precondition: `cycle`, `session` and `box`
-// outlive the socket.
-std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
-                                            const RunOptions& options, const controller::BoxReader& box);
+// Schedules the changes and orders of the session's script. Call it before the first cycle; throws SetupError.
+void schedule_changes(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options);
+
+// Returns handlers of orders and changes to the running session, for any thread. They read the session's status from
+// `box`. Precondition: all arguments outlive the handlers.
+ControlHandlers control_handlers(controller::Cycle& cycle, const PreparedSession& session, const RunOptions& options,
+                                 const controller::BoxReader& box);
+
+// Opens the control socket if the options ask for one; otherwise returns null.
+std::unique_ptr<ControlSocket> control_socket(const RunOptions& options, ControlHandlers handlers);
 
 }  // namespace proxarm::command_line

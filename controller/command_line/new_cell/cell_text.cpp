@@ -12,7 +12,11 @@ namespace {
 std::string number(double x) {
   char text[32];
   std::snprintf(text, sizeof text, "%.7g", x);
-  return text;
+  // Some readers of YAML, such as PyYAML, take 5e-05 for a text.
+  std::string number = text;
+  const std::size_t exponent = number.find('e');
+  if (exponent != std::string::npos && number.find('.') == std::string::npos) number.insert(exponent, ".0");
+  return number;
 }
 
 // Returns a name from a URDF as a YAML scalar. Such a name may have any characters, so it is quoted if YAML could

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <utility>
 
 #include "models/arm/arm.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -102,6 +104,19 @@ void choose_torque(const ChainJoint& joint, const Load& load, double rotor, desc
   remarks.emplace_back(text);
 }
 
+// Of joints whose URDF says no effort, in one line; empty where there are none.
+std::string silent_efforts(const std::vector<ChainJoint>& joints, const description::Cell& cell) {
+  std::string names, torques;
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    if (joints[i].max_effort > 0.0) continue;
+    const std::string comma = names.empty() ? "" : ", ";
+    names += comma + joints[i].name;
+    torques += comma + description::rounded_text(cell.drives[i].max_torque_Nm) + (joints[i].slides ? " N" : " Nm");
+  }
+  if (names.empty()) return "";
+  return "the URDF says no effort of " + names + ": " + torques + " are taken, by what the arm weighs";
+}
+
 }  // namespace
 
 std::vector<std::string> size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints,
@@ -151,6 +166,7 @@ std::vector<std::string> size_drives(description::Cell& cell, const std::vector<
                   weakest.c_str(), bears_N);
     remarks.emplace_back(text);
   }
+  if (std::string silent = silent_efforts(joints, cell); !silent.empty()) remarks.push_back(std::move(silent));
   return remarks;
 }
 

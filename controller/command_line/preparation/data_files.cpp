@@ -14,8 +14,12 @@ fs::path shipped_file(const std::string& relative) {
   // A user's own program that links the installed libraries isn't beside share/proxarm, so it uses the path known at
   // build time.
   const fs::path source = fs::path(PROXARM_SOURCE_DIR) / relative;
-  const fs::path where_installed = fs::path(PROXARM_INSTALLED_DATA) / relative;
-  return !fs::exists(source, ignored) && fs::exists(where_installed, ignored) ? where_installed : source;
+  if (fs::exists(source, ignored)) return source;
+  // Where `cmake --install` was configured to put them, and where Debian's packages do.
+  for (const char* const data : {PROXARM_INSTALLED_DATA, "/usr/share/proxarm"}) {
+    if (fs::exists(fs::path(data) / relative, ignored)) return fs::path(data) / relative;
+  }
+  return source;
 }
 
 fs::path user_file(const fs::path& given) {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <limits>
+#include <set>
 
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/session_checks.hpp"
@@ -14,6 +16,7 @@
 #include "models/arm/inverse_kinematics.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/description/modbus_drive.hpp"
 #include "models/geometry/eigenvalues.hpp"
 #include "models/mesh/mesh_topology.hpp"
 #include "models/rigid_shapes/solid.hpp"
@@ -318,6 +321,11 @@ std::vector<std::string> surprises(const PreparedSession& session) {
   const double reach_m = std::max(arm.path_curvature().maxCoeff(), 0.1);
   std::vector<std::string> lines = controller::cell_doubts(session.cell, arm);
   const auto add = [&](const std::vector<std::string>& more) { lines.insert(lines.end(), more.begin(), more.end()); };
+  std::set<std::filesystem::path> maps;  // of registers; several drives may have one
+  for (const description::DriveDescription& drive : session.cell.drives) {
+    if (drive.on_can() || !maps.insert(drive.description).second) continue;
+    add(controller::register_doubts(description::load_modbus_drive(drive.description)));
+  }
   add(controller::scene_doubts(session.scene, arm.tool_pose(arm.start_rad()).translation(), reach_m));
   add(controller::hand_doubts(session.hand));
   add(weight_surprises(session, arm));

@@ -10,16 +10,10 @@
 #include <string>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/record/black_box.hpp"
 #include "controller/record/replay_log.hpp"
-#include "controller/session/bring_up.hpp"
 
 namespace proxarm::command_line {
-
-// Returns the head of the session's replay; its first cycle and state aren't filled in.
-controller::ReplayHead replay_head(const PreparedSession& session, const std::vector<std::string>& bus_names,
-                                   const controller::BusIndices& indices);
-// Returns all files from which the session was prepared.
-std::vector<std::filesystem::path> replay_files(const PreparedSession& session);
 
 class BlackBoxKeeper {
  public:

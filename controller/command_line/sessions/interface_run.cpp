@@ -18,9 +18,11 @@
 #include "controller/command_line/preparation/modbus_rates.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/interface_network.hpp"
-#include "controller/command_line/sessions/recorded_messages.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
 #include "controller/command_line/sessions/zero_run.hpp"
+#include "controller/library/black_box_files.hpp"
+#include "controller/library/recorded_messages.hpp"
+#include "controller/library/session_summary.hpp"
 #include "controller/record/frame_tap.hpp"
 #include "controller/report/latency.hpp"
 #include "controller/session/bring_up.hpp"
@@ -67,7 +69,7 @@ class Drain {
  public:
   Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output,
         std::vector<fieldbus::BitRates> rates, BlackBoxKeeper& keeper, controller::LatencyMeter& meter,
-        controller::ReplayRecorder* replay, RecordedMessages* messages, std::function<void()> on_failure)
+        controller::ReplayRecorder* replay, controller::RecordedMessages* messages, std::function<void()> on_failure)
       : records_(records),
         tap_(tap),
         output_(output),
@@ -144,7 +146,7 @@ class Drain {
   BlackBoxKeeper& keeper_;
   controller::LatencyMeter& meter_;
   controller::ReplayRecorder* replay_;
-  RecordedMessages* messages_;
+  controller::RecordedMessages* messages_;
   std::function<void()> on_failure_;
   std::exception_ptr failure_;  // set by the thread, and read after the thread has ended
   std::vector<std::int64_t> busy_ns_;
@@ -172,12 +174,13 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
                                                          indices, controller::opener_of(fieldbus::ModbusPeers::any));
   SessionOutput output(session, options, false);
   std::unique_ptr<controller::ReplayRecorder> replay;
-  std::unique_ptr<RecordedMessages> messages;
+  std::unique_ptr<controller::RecordedMessages> messages;
   if (!options.record_dir.empty()) {
-    replay = std::make_unique<controller::ReplayRecorder>(keeper.box(), options.record_dir, replay_files(session));
-    messages = std::make_unique<RecordedMessages>(options.record_dir, session);
+    replay = std::make_unique<controller::ReplayRecorder>(keeper.box(), options.record_dir,
+                                                          controller::replay_files(session));
+    messages = std::make_unique<controller::RecordedMessages>(options.record_dir, session);
   }
-  keeper.set_head(replay_head(session, names_in(tap), indices));
+  keeper.set_head(controller::replay_head(session, names_in(tap), indices));
   bring_up_devices(network, parts);
   report_modbus_rates(session, parts);
 
@@ -185,7 +188,9 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   cycle.write_to(keeper.box());
   SignalWatch signals([&] { cycle.request_stop(); });
   output.introduce();
-  const std::unique_ptr<ControlSocket> control = take_changes(cycle, session, options, keeper.box());
+  schedule_changes(cycle, session, options);
+  const std::unique_ptr<ControlSocket> control =
+      control_socket(options, control_handlers(cycle, session, options, keeper.box()));
   controller::LatencyMeter meter(keeper.box(), cycle.parts().sensor_bus, cycle.parts().sensor->wanted_ids());
   Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, meter, replay.get(),
               messages.get(), [&] { cycle.request_stop(); });
@@ -193,7 +198,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   controller::SessionTally tally;
   {
     const RealtimeThread realtime;
-    tally = controller::run_session(cycle, tap, session_length(session, options), {});
+    tally = controller::run_session(cycle, tap, controller::session_length(session, options), {});
     cycle.shut_down();
   }
   const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();

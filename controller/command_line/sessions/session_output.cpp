@@ -1,17 +1,14 @@
 #include "controller/command_line/sessions/session_output.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include "controller/command_line/entry/exit_status.hpp"
-#include "controller/command_line/live/live_parameters.hpp"
-#include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
 #include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/command_line/sessions/view_process.hpp"
+#include "controller/library/session_files.hpp"
 #include "controller/library/session_summary.hpp"
 #include "controller/report/terminal.hpp"
 #include "models/arm/tool_space.hpp"
@@ -28,25 +25,7 @@ constexpr const char* default_plot = "proxarm-run.svg";
 // A force above empty_handle_N times this factor isn't from an empty handle, even while the tool rings.
 constexpr double felt_bands = 4.0;
 
-std::string rendered_text(const PreparedSession& session) {
-  const controller::SessionSettings& s = session.settings;
-  char text[96];
-  if (session.impedance()) {
-    std::snprintf(text, sizeof text, "impedance type, K = %.4g N/m, B = %.4g Ns/m", s.coupling_stiffness_N_per_m,
-                  s.coupling_damping_Ns_per_m);
-  } else {
-    std::snprintf(text, sizeof text, "%.4g kg felt", s.mass_kg);
-  }
-  return text;
-}
-
-std::string plot_title(const PreparedSession& session) {
-  char period[32];
-  std::snprintf(period, sizeof period, ", T = %.4g ms", 1e3 * session.settings.period_s);
-  return session.scene.name + ": " + rendered_text(session) + period;
-}
-
-// Returns a text that says when the clock of each script started; empty if the options have no script.
+// Returns a text that says when the clocks of the scripts started; empty without a script.
 std::string clocks_text(const Summary& summary, const RunOptions& options) {
   if (options.faults.empty() && options.changes.empty() && options.orders.empty() && options.enabling.empty())
     return "";
@@ -65,50 +44,21 @@ std::string clocks_text(const Summary& summary, const RunOptions& options) {
 
 }  // namespace
 
-controller::SessionLength session_length(const PreparedSession& session, const RunOptions& options) {
-  controller::SessionLength length{session.duration_s};
-  const bool somebody_presses =
-      session.cell.enabling_input && !session.settings.without_enabling_input && !options.bus.simulated();
-  if (options.control.empty() && !somebody_presses) length.longest_release_s = session.duration_s;
-  return length;
-}
-
 SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth)
     : session_(session),
       options_(options),
       builder_(controller::summary_config(session)),
       progress_(session.duration_s),
-      deriver_(session.cell),
-      loop_(session.loop) {
-  refuse_lost_plot();
-  if (!session.impedance()) {
-    poses_ = std::make_unique<PoseWatch>(controller::PassedPoses(deriver_.arm(), session.cell, hand_model(session),
-                                                                 session.loop, turned_model(session)));
-    if (options.view_place || !options.record_dir.empty()) poses_->find_smallest();
-  }
+      deriver_(session.cell) {
+  controller::require_plot_file(options.plot_file);
+  if (!session.impedance()) poses_ = std::make_unique<controller::LedPoses>(session, options, deriver_);
   swing_ = slowest_swing(session);
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
-  if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
+  if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(controller::plot_title(session));
   if (options.record_dir.empty()) return;
   writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, controller::joint_names(session.cell),
                                                         with_truth, options.signals);
   writer_->write_file("effective.yaml", effective_config(session));
-}
-
-// Throws SetupError before the run if the plot's file can't be written. Its name must end in .svg, so that --plot
-// overwrites no file but a picture.
-void SessionOutput::refuse_lost_plot() const {
-  const fs::path& file = options_.plot_file;
-  if (file.empty()) return;
-  const auto refuse = [&](const char* expected) {
-    throw description::SetupError(
-        {.key = "--plot", .found = description::in_quotes(file.string()), .expected = expected});
-  };
-  if (file.extension() != ".svg") refuse("a file name that ends in .svg");
-  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  std::error_code ignored;
-  if (!fs::is_directory(folder, ignored)) refuse("a file in a folder that is there");
-  if (access(folder.c_str(), W_OK) != 0 || fs::is_directory(file, ignored)) refuse("a file that can be written");
 }
 
 namespace {
@@ -148,8 +98,8 @@ void SessionOutput::introduce() const {
   const models::ToolSpace reach = models::tool_space(arm);
   const models::TipMass tip = arm.effective_mass_range(arm.start_rad(), reach.dimensions);
   std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
-              session_.scene.name.c_str(), rendered_text(session_).c_str(), 1e3 * session_.settings.period_s,
-              1e3 * total_delay_s(session_));
+              session_.scene.name.c_str(), controller::rendered_text(session_).c_str(),
+              1e3 * session_.settings.period_s, 1e3 * total_delay_s(session_));
   std::printf("the arm itself, without control: %.3g to %.3g kg at the tip", tip.min_kg, tip.max_kg);
   if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
   std::printf("\n");
@@ -193,40 +143,12 @@ void SessionOutput::say_timestep(const CycleRecord& record) {
     if (told_period_ns_ > 0) {
       std::fprintf(stderr, "proxarm: timestep %.4g ms from %.4g s on, all drives have confirmed it\n",
                    1e-6 * static_cast<double>(record.period_ns), 1e-9 * static_cast<double>(record.time_ns));
-      const double period_s = 1e-9 * static_cast<double>(record.period_ns);
-      loop_ = with_timestep(session_, options_, period_s).loop;
-      if (poses_) poses_->change(judged_loop());
     }
     told_period_ns_ = record.period_ns;
   }
 }
 
-// Returns the loop with the present age of samples. A sample that comes a cycle late is a cycle older when it takes
-// effect.
-controller::LoopModel SessionOutput::judged_loop() const {
-  controller::LoopModel loop = loop_;
-  if (samples_late_) loop.delay_s += loop.period_s;
-  return loop;
-}
-
-// Finds whether most samples of about the last quarter of a second were late. If so, the loop is judged with the age of
-// late samples.
-void SessionOutput::follow_lateness(const CycleRecord& record) {
-  constexpr double average_s = 0.25;
-  const double period_s = 1e-9 * static_cast<double>(record.period_ns);
-  const double late = record.has(controller::RecordFlag::sample_late) ? 1.0 : 0.0;
-  late_share_ += std::min(1.0, period_s / average_s) * (late - late_share_);
-  if ((late_share_ > 0.5) == samples_late_) return;
-  samples_late_ = !samples_late_;
-  if (poses_) poses_->change(judged_loop());
-  if (!samples_late_) return;
-  std::fprintf(stderr,
-               "proxarm: from %.4g s on the force sensor's samples come a cycle late and are used %.4g ms later: the "
-               "stability of the mass is judged with that; what delays them, or a longer --timestep?\n",
-               1e-9 * static_cast<double>(record.time_ns), 1e3 * period_s);
-}
-
-// Warns on standard error while the arm oscillates, once for each lasting spell.
+// Warns on standard error as it happens, once for each lasting spell.
 void SessionOutput::say_oscillation() {
   const controller::Oscillation present = builder_.oscillation();
   if (present.lasts && !told_oscillation_) {
@@ -254,21 +176,23 @@ void SessionOutput::say_belief(const CycleRecord& record) {
 }
 
 void SessionOutput::judge_pose(const CycleRecord& record) {
-  if (!poses_ || record.phase != controller::Phase::rendering) return;
-  if (!(record.added_damping_Ns_per_m > 0.0)) user_damping_Ns_per_m_ = record.proxy_damping_Ns_per_m;
-  const auto joints_rad = [&] { return deriver_.link_rad(record); };
-  const bool turns = record.proxy_inertia_kg_m2 > 0.0;
-  const controller::PassedPoses::Felt felt{.mass_kg = record.proxy_mass_kg + record.tool_mass_kg,
-                                           .damping_Ns_per_m = user_damping_Ns_per_m_,
-                                           .inertia_kg_m2 = record.proxy_inertia_kg_m2,
-                                           .turning_damping_Nms_per_rad = record.proxy_turning_damping_Nms_per_rad};
-  const models::ToolPose tool_W{controller::vec3(record.tool_W_m),
-                                turns ? models::Quaternion(record.proxy_q_W.data()) : models::Quaternion::Identity()};
-  poses_->pass(1e-9 * static_cast<double>(record.time_ns), tool_W, felt, joints_rad);
+  if (!poses_) return;
+  const bool were_late = poses_->samples_late();
+  poses_->add(record);
+  if (poses_->samples_late() && !were_late) say_lateness(record);
+  if (record.phase != controller::Phase::rendering) return;
   if (options_.view_place) {
     for (const controller::PassedPoses::Place& place : poses_->places()) tell_margin(*options_.view_place, place);
   }
   say_poses();
+}
+
+// Warns on standard error once most samples have been late for a quarter of a second.
+void SessionOutput::say_lateness(const CycleRecord& record) const {
+  std::fprintf(stderr,
+               "proxarm: from %.4g s on the force sensor's samples come a cycle late and are used %.4g ms later: the "
+               "stability of the mass is judged with that; what delays them, or a longer --timestep?\n",
+               1e-9 * static_cast<double>(record.time_ns), 1e-6 * static_cast<double>(record.period_ns));
 }
 
 // Reports on standard error the unstable places that the arm passed, because at the session's start only the start pose
@@ -299,7 +223,6 @@ void SessionOutput::tell(const CycleRecord& record) {
     last_phase_ = record.phase;
   }
   say_timestep(record);
-  follow_lateness(record);
   builder_.add(record);
   say_oscillation();
   say_belief(record);
@@ -327,14 +250,7 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
     summary.poses = poses_->summary();
     say_poses();
   }
-  for (const controller::ScheduledCommand& order : cycle.scheduled_commands()) {
-    if (order.taken && order.refusal == nullptr) continue;
-    summary.idle_orders.push_back({order_name(order.request.order), static_cast<double>(order.at_ns) / 1e9,
-                                   order.taken ? order.refusal : "the session had ended before"});
-  }
-  for (const IdleChange& change : idle_changes(cycle, options_.changes)) {
-    summary.idle_orders.push_back({"set " + change.text, change.time_s, change.refusal});
-  }
+  controller::add_idle_orders(summary, cycle, options_);
   return summary;
 }
 

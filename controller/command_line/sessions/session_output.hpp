@@ -11,8 +11,8 @@
 #include "controller/command_line/live/signal_watch.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/sessions/black_box_keeper.hpp"
-#include "controller/command_line/sessions/pose_watch.hpp"
 #include "controller/cycle/cycle.hpp"
+#include "controller/library/led_poses.hpp"
 #include "controller/report/plot.hpp"
 #include "controller/report/progress.hpp"
 #include "controller/report/session_record.hpp"
@@ -21,9 +21,6 @@
 #include "controller/signals/derived_signals.hpp"
 
 namespace proxarm::command_line {
-
-// Returns the session's length. If no person can end a release, the length also has the longest time of a release.
-controller::SessionLength session_length(const PreparedSession& session, const RunOptions& options);
 
 class SessionOutput {
  public:
@@ -48,15 +45,13 @@ class SessionOutput {
   int finish(controller::Summary summary, BlackBoxKeeper& keeper);
 
  private:
-  void refuse_lost_plot() const;
   bool draw_plot(const controller::Summary& summary);
   void say_timestep(const controller::CycleRecord& record);
-  void follow_lateness(const controller::CycleRecord& record);
-  [[nodiscard]] controller::LoopModel judged_loop() const;
   void say_oscillation();
   void say_belief(const controller::CycleRecord& record);
   void tell(const controller::CycleRecord& record);
   void judge_pose(const controller::CycleRecord& record);
+  void say_lateness(const controller::CycleRecord& record) const;
   void say_poses();
   void say_how_to_get_free(controller::Phase phase) const;
 
@@ -67,11 +62,7 @@ class SessionOutput {
   std::unique_ptr<controller::PlotBuilder> plot_;
   std::unique_ptr<controller::SessionWriter> writer_;
   controller::SignalDeriver deriver_;
-  std::unique_ptr<PoseWatch> poses_;             // null for the impedance type
-  controller::LoopModel loop_;                   // the loop with the present timestep, if all samples are in time
-  double late_share_ = 0.0;                      // share of late samples in about the last 0.25 s
-  bool samples_late_ = false;                    // whether most samples are late
-  double user_damping_Ns_per_m_ = 0.0;           // damping without what passivity adds
+  std::unique_ptr<controller::LedPoses> poses_;  // null for the impedance type
   std::optional<controller::Swing> swing_;       // of a tool that the hand turns
   std::chrono::steady_clock::duration spent_{};  // time spent on records
   std::int64_t rendered_ns_ = 0;

@@ -1,14 +1,12 @@
 // Runs `proxarm run --bus sim`: controller and simulated arm in one process, on in-process buses.
 #pragma once
 
-#include <optional>
+#include <memory>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
-#include "controller/command_line/sessions/recorded_messages.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
-#include "controller/session/bring_up.hpp"
-#include "fieldbus/simulated/simulated_can_network.hpp"
-#include "sim/cell/simulated_cell.hpp"
+#include "controller/library/recorded_messages.hpp"
+#include "controller/library/simulated_loop.hpp"
 
 namespace proxarm::command_line {
 
@@ -23,21 +21,17 @@ class SimulatedRun {
   int run();
 
  private:
-  int run_cycles(controller::CycleParts parts);
-  void drain(controller::SpscRing<controller::CycleRecord>& records);
+  void keep_record();
+  int run_cycles();
+  void drain(controller::CycleRecord record, const sim::Truth& truth);
 
   const PreparedSession& session_;
   const RunOptions& options_;
   BlackBoxKeeper& keeper_;
-  fieldbus::SimulatedCanNetwork network_;
-  sim::SimulatedCell far_end_;
-  scenes::CompiledScene scene_;
+  controller::SimulatedLoop loop_;
   SessionOutput output_;
   std::unique_ptr<controller::ReplayRecorder> replay_;
-  std::unique_ptr<RecordedMessages> messages_;
-  std::optional<std::int64_t> exploded_at_ns_;  // when the simulated arm's motion became impossible
-  std::int64_t power_on_ns_ = 0;
-  sim::Truth truth_;  // the simulation's truth at the present cycle's SYNC
+  std::unique_ptr<controller::RecordedMessages> messages_;
 };
 
 }  // namespace proxarm::command_line

@@ -13,12 +13,15 @@ import re
 import shutil
 import socket
 import subprocess
+import typing
+import warnings
 
 import numpy
 
 from ._proxarm import SetupError, World, _Session, _read_table, _unpacked
 
-__all__ = ["Live", "Record", "Result", "Session", "SetupError", "Signals", "Study", "World", "load", "run", "study"]
+__all__ = ["Contact", "Live", "Record", "Result", "Session", "SetupError", "SetupWarning", "Signals", "Study", "World",
+           "load", "run", "study"]
 
 
 class Signals(collections.abc.Mapping):
@@ -70,14 +73,15 @@ class Signals(collections.abc.Mapping):
 
 class Result:
     """What a simulated session gives: `summary`, a dict as `proxarm run --json` prints it, its `signals`, a row for each
-    cycle, and its `contacts`, a row for each contact of each cycle (docs/files.md), both as Signals."""
+    cycle, and its `contacts`, a row for each contact of each cycle (docs/files.md), both as Signals; `objects` are the
+    names of those that contacts have by number."""
 
-    def __init__(self, summary, signals, contacts):
-        self.summary, self.signals, self.contacts = summary, signals, contacts
+    def __init__(self, summary, signals, contacts, objects):
+        self.summary, self.signals, self.contacts, self.objects = summary, signals, contacts, objects
 
 
-class Record(Result):
-    """A session that was kept by `proxarm run --record`."""
+class Record:
+    """A session that was kept by `proxarm run --record`: a Result in files, but for the objects' names."""
 
     def __init__(self, folder, summary, signals, meanings):
         self.folder, self.summary, self.signals = folder, summary, signals
@@ -94,23 +98,99 @@ class Record(Result):
         return Signals(_read_table(str(self.folder / "contacts.csv"), names, text))
 
 
-class Session:
-    """A session of the simulated arm. Options are those of `proxarm run`: numbers in SI units, or text with its unit.
+class Contact(typing.NamedTuple):
+    """What touches in a step of a world that is a function: its `normal` out of the object in W, of any length, the name
+    of the `object`, the `point` in W where it isn't the proxy's place, and whether the proxy `slips` there."""
 
-    Session(scene="scenes/wall.yaml", mass="4kg").run() -> Result
+    normal: collections.abc.Sequence
+    object: str = "world"
+    point: typing.Optional[collections.abc.Sequence] = None
+    slips: bool = False
+
+
+class SetupWarning(UserWarning):
+    """What is possible but hardly meant, as `proxarm run` warns of it: a value in another unit, say."""
+
+
+class _Asked:
+    """A session that runs, in this process or in another: ask() sends it a line."""
+
+    def ask(self, line):
+        raise NotImplementedError
+
+    def status(self):
+        """As `proxarm status --json`."""
+        return json.loads(self.ask("status"))
+
+    def set(self, changes=None, **more):
+        """set(mass=3, damping="5Ns/m") or set({"wall.friction": 0.2}): all of them or none."""
+        return self.ask("\t".join(f"{name}={value}" for name, value in {**(changes or {}), **more}.items()))
+
+    def hold(self):
+        """Holds the arm, drives enabled."""
+        return self.ask("hold")
+
+    def resume(self):
+        """Goes on after a hold."""
+        return self.ask("resume")
+
+    def release(self):
+        """Lets somebody free who is pinned: the arm yields to the hand, slowly."""
+        return self.ask("release")
+
+    def back_off(self, distance="20mm"):
+        """Moves the arm away from what it presses on."""
+        return self.ask(f"back-off {distance}")
+
+    def reset(self):
+        """Enables the drives again after a fault, into a hold."""
+        return self.ask("reset")
+
+
+def _option(name, value):
+    """An option's value as the library takes it: None, a bool, a number, a text or a list of texts."""
+    if isinstance(value, (list, tuple)):
+        return [text if isinstance(text, str) else f"{text}" for text in map(functools.partial(_option, name), value)]
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, (bool, numpy.bool_)):
+        return bool(value)
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, (int, float, numpy.number)):
+        return float(value)
+    raise SetupError(f"--{name.replace('_', '-')}: found {value!r}, expected a number, a text, True, or a list of texts")
+
+
+class Session(_Asked):
+    """A session of the simulated arm. Options are those of `proxarm run --help`, with underscores for hyphens: numbers in
+    SI units, or text with its unit; True for one that takes nothing, a list for one that may be repeated.
+
+    Session(scene="scenes/wall.yaml", mass="4kg", fault=["axis_2:silent@2s"]).run() -> Result
     """
 
-    def __init__(self, cell="", scene="", hand="", *, mass=None, timestep=None, duration=10.0, damping=0.0, spring=0.0,
-                 order=1, lookahead="off", force_unstable=False, bus="sim"):
-        self._options = (os.fspath(cell), os.fspath(scene), os.fspath(hand), mass, timestep, duration, damping, spring,
-                         order, lookahead, force_unstable, bus)
-        _Session(*self._options)  # what is wrong is said here
+    def __init__(self, cell=None, scene=None, hand=None, **options):
+        given = {"cell": cell or None, "scene": scene or None, "hand": hand or None, **options}
+        self._options = {name: _option(name, value) for name, value in given.items()}
+        self._running = _Session(self._options)  # what is wrong is said here
+        for text in self._running.surprises():
+            warnings.warn(text, SetupWarning, stacklevel=2)
 
     def run(self, world=None, hand=None):
-        """world(kappa, p, q) -> where the proxy goes, in place of the scene; hand(time_s, position, velocity) -> N, in
-        place of the hand's motion and grip. All in W, three numbers each. What either raises comes out of here."""
-        summary, columns, contacts = _Session(*self._options).run(world, hand)
-        return Result(json.loads(summary), Signals(columns), Signals(contacts))
+        """world(kappa, p, q) -> where the proxy goes, or that and a list of Contacts, in place of the scene; a world that
+        names no contact is free of them. hand(time_s, position, velocity) -> N, in place of the hand's motion and grip.
+        All in W, three numbers each. What either raises comes out of here."""
+        self._running = _Session(self._options)
+        summary, columns, contacts, objects = self._running.run(world, hand)
+        return Result(json.loads(summary), Signals(columns), Signals(contacts), objects)
+
+    def ask(self, line):
+        """While it runs, from one of its functions or from another thread: what its socket takes, such as "hold"."""
+        return self._running.ask(line)
+
+    def stop(self):
+        """While it runs: ends it by a controlled stop."""
+        self._running.stop()
 
 
 KEEP_FROM_BYTES = 100_000_000  # of a signals.csv that takes about half a second to read
@@ -292,7 +372,7 @@ def study(name, out, **options):
     return Study(out, name)
 
 
-class Live:
+class Live(_Asked):
     """A session that runs and was started with `--control`, through its socket, as `proxarm set` and `hold` ask it."""
 
     def __init__(self, path=None):
@@ -317,31 +397,3 @@ class Live:
         if not text.startswith("ok: "):
             raise SetupError(text)
         return text.removeprefix("ok: ")
-
-    def status(self):
-        """As `proxarm status --json`."""
-        return json.loads(self.ask("status"))
-
-    def set(self, changes=None, **more):
-        """set(mass=3, damping="5Ns/m") or set({"wall.friction": 0.2}): all of them or none."""
-        return self.ask("\t".join(f"{name}={value}" for name, value in {**(changes or {}), **more}.items()))
-
-    def hold(self):
-        """Holds the arm, drives enabled."""
-        return self.ask("hold")
-
-    def resume(self):
-        """Goes on after a hold."""
-        return self.ask("resume")
-
-    def release(self):
-        """Lets somebody free who is pinned: the arm yields to the hand, slowly."""
-        return self.ask("release")
-
-    def back_off(self, distance="20mm"):
-        """Moves the arm away from what it presses on."""
-        return self.ask(f"back-off {distance}")
-
-    def reset(self):
-        """Enables the drives again after a fault, into a hold."""
-        return self.ask("reset")

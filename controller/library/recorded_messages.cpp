@@ -1,8 +1,8 @@
-#include "controller/command_line/sessions/recorded_messages.hpp"
+#include "controller/library/recorded_messages.hpp"
 
-namespace proxarm::command_line {
+namespace proxarm::controller {
 
-RecordedMessages::RecordedMessages(const std::filesystem::path& folder, const PreparedSession& session)
+RecordedMessages::RecordedMessages(const std::filesystem::path& folder, const command_line::PreparedSession& session)
     : stage_(session.cell, session.scene,
              {.period_s = session.settings.period_s,
               .mass_kg = session.settings.mass_kg,
@@ -11,4 +11,4 @@ RecordedMessages::RecordedMessages(const std::filesystem::path& folder, const Pr
               .impedance = session.impedance()}),
       record_(folder / "session.mcap", stage_) {}
 
-}  // namespace proxarm::command_line
+}  // namespace proxarm::controller

@@ -13,43 +13,42 @@
 #include "controller/report/summary.hpp"
 #include "controller/stability/passed_poses.hpp"
 
-namespace proxarm::command_line {
+namespace proxarm::controller {
 
 class PoseWatch {
  public:
-  explicit PoseWatch(controller::PassedPoses poses) : poses_(std::move(poses)) {}
+  explicit PoseWatch(PassedPoses poses) : poses_(std::move(poses)) {}
   PoseWatch(const PoseWatch&) = delete;
   PoseWatch& operator=(const PoseWatch&) = delete;
   ~PoseWatch();  // drops the places that aren't judged yet
 
   // Also searches the smallest stable mass at each place from now on. Call this function before the first pass().
   void find_smallest() { poses_.find_smallest(); }
-  void change(const controller::LoopModel& loop) { poses_.change(loop); }
+  void change(const LoopModel& loop) { poses_.change(loop); }
   template <class Joints>
-  void pass(double time_s, const models::ToolPose& tool_W, const controller::PassedPoses::Felt& felt,
-            const Joints& joints_rad) {
+  void pass(double time_s, const models::ToolPose& tool_W, const PassedPoses::Felt& felt, const Joints& joints_rad) {
     if (auto asked = poses_.come_to(time_s, tool_W, felt, joints_rad)) ask(std::move(*asked));
   }
   // Returns the unstable places to report that this function hasn't returned before, in the order in which they were
   // judged.
-  [[nodiscard]] std::vector<controller::UnstablePlaces> news();
+  [[nodiscard]] std::vector<UnstablePlaces> news();
   // Returns the places judged since the last call. Returns none unless find_smallest() was called.
-  [[nodiscard]] std::vector<controller::PassedPoses::Place> places();
+  [[nodiscard]] std::vector<PassedPoses::Place> places();
   // Waits until all places are judged.
-  [[nodiscard]] controller::PosesSummary summary();
+  [[nodiscard]] PosesSummary summary();
 
  private:
-  void ask(controller::PassedPoses::Asked asked);
+  void ask(PassedPoses::Asked asked);
   void work();
 
-  controller::PassedPoses poses_;
+  PassedPoses poses_;
   std::mutex mutex_;  // guards the members below
   std::condition_variable changed_;
-  std::deque<controller::PassedPoses::Asked> asked_;
-  std::vector<controller::UnstablePlaces> news_;
-  std::vector<controller::PassedPoses::Place> found_;  // places that places() hasn't returned yet
+  std::deque<PassedPoses::Asked> asked_;
+  std::vector<UnstablePlaces> news_;
+  std::vector<PassedPoses::Place> found_;  // places that places() hasn't returned yet
   bool busy_ = false, ends_ = false;
   std::thread thread_;
 };
 
-}  // namespace proxarm::command_line
+}  // namespace proxarm::controller

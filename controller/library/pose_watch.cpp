@@ -1,8 +1,8 @@
-#include "controller/command_line/sessions/pose_watch.hpp"
+#include "controller/library/pose_watch.hpp"
 
 #include <utility>
 
-namespace proxarm::command_line {
+namespace proxarm::controller {
 
 PoseWatch::~PoseWatch() {
   {
@@ -13,7 +13,7 @@ PoseWatch::~PoseWatch() {
   if (thread_.joinable()) thread_.join();
 }
 
-void PoseWatch::ask(controller::PassedPoses::Asked asked) {
+void PoseWatch::ask(PassedPoses::Asked asked) {
   {
     const std::lock_guard lock(mutex_);
     asked_.push_back(std::move(asked));
@@ -27,12 +27,12 @@ void PoseWatch::work() {
   while (true) {
     changed_.wait(lock, [this] { return ends_ || !asked_.empty(); });
     if (ends_) return;
-    const controller::PassedPoses::Asked asked = std::move(asked_.front());
+    const PassedPoses::Asked asked = std::move(asked_.front());
     asked_.pop_front();
     busy_ = true;
     const std::size_t found_before = poses_.places().size();
     lock.unlock();
-    const std::optional<controller::UnstablePlaces> told = poses_.judge(asked);
+    const std::optional<UnstablePlaces> told = poses_.judge(asked);
     lock.lock();
     busy_ = false;
     if (told) news_.push_back(*told);
@@ -41,20 +41,20 @@ void PoseWatch::work() {
   }
 }
 
-std::vector<controller::UnstablePlaces> PoseWatch::news() {
+std::vector<UnstablePlaces> PoseWatch::news() {
   const std::lock_guard lock(mutex_);
   return std::exchange(news_, {});
 }
 
-std::vector<controller::PassedPoses::Place> PoseWatch::places() {
+std::vector<PassedPoses::Place> PoseWatch::places() {
   const std::lock_guard lock(mutex_);
   return std::exchange(found_, {});
 }
 
-controller::PosesSummary PoseWatch::summary() {
+PosesSummary PoseWatch::summary() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return asked_.empty() && !busy_; });
   return {.judged = poses_.judged(), .unstable = poses_.unstable(), .places = poses_.places()};
 }
 
-}  // namespace proxarm::command_line
+}  // namespace proxarm::controller

@@ -7,15 +7,15 @@
 #include "controller/view/messages/mcap_record.hpp"
 #include "controller/view/stage/stage.hpp"
 
-namespace proxarm::command_line {
+namespace proxarm::controller {
 
 class RecordedMessages {
  public:
   // Creates the file. Throws SetupError.
-  RecordedMessages(const std::filesystem::path& folder, const PreparedSession& session);
-  // Writes a cycle. `completed` is a record that SessionOutput::add() has returned.
-  void add(const controller::CycleRecord& completed) { record_.add(completed); }
-  void drain(const controller::BoxReader& box) { record_.drain(box); }
+  RecordedMessages(const std::filesystem::path& folder, const command_line::PreparedSession& session);
+  // Writes a cycle. Precondition: the record is complete, as SessionOutput::add() returns it.
+  void add(const CycleRecord& completed) { record_.add(completed); }
+  void drain(const BoxReader& box) { record_.drain(box); }
   void finish() { record_.finish(); }
 
  private:
@@ -23,4 +23,4 @@ class RecordedMessages {
   view::McapRecord record_;
 };
 
-}  // namespace proxarm::command_line
+}  // namespace proxarm::controller
