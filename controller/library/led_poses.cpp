@@ -1,3 +1,4 @@
+#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/library/led_poses.hpp"
 
 #include <algorithm>
