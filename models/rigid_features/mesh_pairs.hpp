@@ -56,7 +56,7 @@ class MeshPairs {
   }
 
  private:
-  // prefetch distance in list items; most leaves of a large mesh aren't in a cache
+  // Prefetch distance in list items; most leaves of a large mesh aren't in a cache
   static constexpr std::size_t kAhead = 6;
   // A node of a tree, with `first` and `count` as in TriangleMesh::NodePair. The disc is in the frame of the second
   // mesh.

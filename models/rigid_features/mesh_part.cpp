@@ -46,7 +46,7 @@ double thickness_at(const TriangleMesh& mesh, std::uint32_t face, const Vec3& pl
 }
 
 // Returns the thickness of the thinnest wall. The thickness at a face is the largest thickness at four of the face's
-// places, so that a wall counts as thin only where it isn't just running out into a sharp edge.
+// places. So a wall that ends in a sharp edge counts with its thickness beside the edge.
 double thickness(const TriangleMesh& mesh) {
   double least = std::numeric_limits<double>::infinity();
   for (std::uint32_t f = 0; f < mesh.size(); ++f) {

@@ -11,7 +11,7 @@ namespace {
 bool misses(const Vec3& n, const Vec3& left, const Vec3& right, double slack) noexcept {
   const Vec3 w = left.cross(right);
   const double size = w.norm();
-  // the faces lie in one plane or back to back: the cone isn't known, so nothing misses it
+  // The faces lie in one plane or back to back: the cone isn't known, so nothing misses it
   if (size < 1e-6) return false;
   return left.cross(n).dot(w) < -slack * size || n.cross(right).dot(w) < -slack * size || n.dot(left + right) < -slack;
 }

@@ -50,7 +50,7 @@ class NearFaces {
   }
 
   [[nodiscard]] double near() const noexcept { return near_; }
-  // by how much the solid may turn in the poses to come, rad
+  // How much the solid may turn in the poses to come, rad.
   [[nodiscard]] double turn() const noexcept { return turn_; }
   [[nodiscard]] const NormalCone::Angle& corners_turn() const noexcept { return corners_turn_; }
   [[nodiscard]] bool all() const noexcept { return all_; }  // false: there was no room for all triangles
