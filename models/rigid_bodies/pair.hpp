@@ -62,7 +62,7 @@ struct Pair {
   PairKind kind = PairKind::point_field;
   std::uint16_t part = 0, entry = 0;  // indices in RigidSetup
   std::uint32_t own = 0, other = 0;   // index of the part's feature; index of the entry's feature
-  // The side of the object's surface on which the tool is, 1 or −1; 0 if the pair isn't judged in this part of the
+  // The side on which the pair's face or edge holds the tool, 1 or −1; 0 if the pair isn't judged in this part of the
   // step.
   float side = 0.0F;
   bool pressed = false;  // the pair had a force in the last local problem
