@@ -16,7 +16,7 @@ constexpr int kHard = 40;
 constexpr double kIdle = 1e-3;
 // A contact joins the local problem only if δ passes it by more than this rounding.
 constexpr double kPassed_m = 1e-16;
-// If δ passes more than kFewPassed contacts, only kAtATime of them join in a round.
+// If δ passes more than kFewPassed contacts, or if the setup is dense, only kAtATime contacts join in a round.
 constexpr std::size_t kAtATime = 4, kFewPassed = 12;
 // If there is no room for all contacts, a contact that δ passes by less than this (a hundredth of kGap_m) doesn't count
 // as missing.
@@ -66,10 +66,11 @@ void LocalStep::linearise(const Found& found, const ToolPose& pose, const ToolPo
   out.f = force != nullptr ? Vec3(axes.transpose() * *force) : Vec3(Vec3::Zero());
 }
 
-// Returns the gap below which contacts join the local problem. If δ passes only few contacts, this is -kPassed_m, so
-// that all join. If a face comes down on a fine mesh, δ passes many vertices at once, and few of them will hold the
-// face. (A prism with many sides that stands up on a table is similar.) The contacts that δ passes by most then join
-// first, kAtATime in a round.
+// Returns the gap below which contacts join the local problem. If δ passes only few contacts and the setup isn't dense,
+// this is -kPassed_m, so that all these contacts join.
+// Reason: if a face comes down on a fine mesh, δ passes many vertices at once, and few of them will hold the face. (A
+// prism with many sides that stands up on a table is similar.) So the contacts that δ passes by most join first,
+// kAtATime in a round.
 double LocalStep::worst_passed(const Twist& xi, const ToolPose& pose) const noexcept {
   std::array<double, kAtATime + 1> least;
   least.fill(-kPassed_m);

@@ -8,8 +8,8 @@
 
 namespace proxarm::models {
 
-// In each name the tool's feature comes first. A field is a flat or hollow object; the distance from it is defined at
-// every point.
+// In the names up to edge_point the tool's feature comes first. A field is a flat or hollow object; the distance from
+// it is defined at every point.
 enum class PairKind : std::uint8_t {
   point_field,
   rim_field,

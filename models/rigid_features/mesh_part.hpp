@@ -16,8 +16,8 @@ struct MeshPart {
   double thickness_m = 0.0;  // thickness of the mesh's thinnest wall
 };
 
-// Throws std::invalid_argument if the mesh is open, or if the constructor of TriangleMesh or TriangleFeatures throws
-// it. X transforms from the mesh's frame into the tool's.
+// Returns a mesh as a part of the tool. X transforms from the mesh's frame into the tool's. Throws
+// std::invalid_argument if the mesh is open, or if the constructor of TriangleMesh or TriangleFeatures throws it.
 MeshPart mesh_part(const MeshTool& shape, const Pose& X);
 
 }  // namespace proxarm::models

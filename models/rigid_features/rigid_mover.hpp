@@ -37,8 +37,8 @@ class RigidMover {
   // Begins a step of a scripted object, from its place one period before the given time to its place at that time. Does
   // nothing for a driven object.
   void set_time(const StepTime& time) noexcept;
-  // Begins a step of a driven object, from its present place to X, relative to its described place. Does nothing for a
-  // scripted object.
+  // Begins a step of a driven object, from its present place to the place X. X is relative to the object's described
+  // place. Does nothing for a scripted object.
   void drive(const Pose& X) noexcept;
   [[nodiscard]] bool driven() const noexcept { return !scripted_; }
 

@@ -9,8 +9,8 @@
 namespace proxarm::models {
 namespace {
 
-// Neighbouring faces count as one plane if their normals differ by less than this angle, rad. The distance of a tool's
-// point from their common edge then equals its distance from the faces, to within this share.
+// Neighbouring faces count as one plane if their normals differ by less than this angle, rad. If a tool's point is over
+// the common edge of such faces, its distance from the edge equals its distance from the faces, to within this share.
 constexpr double kFlat = 1e-9;
 
 }  // namespace
