@@ -1,12 +1,12 @@
 // Takes a step of many parts among moving objects in batches of parts.
 //
 // 1. A thin tool or a thin sheet requires short parts. For example, a step of eight millimetres with a tool of 80 µm
-// has
-//    five hundred parts, of some microseconds each. Most of them change little, so several parts are taken at once.
+//    has five hundred parts, of some microseconds each. Most of them change little, so several parts are taken at
+//    once.
 // 2. If no object is near, the tool moves at once as far as there is room.
-// 3. If an object holds the tool, p̂ moves by many parts at once while the tool hardly moves. Such a batch is correct if
-//    the tool, relative to all objects that it may meet, moves by no more than one part allows. How far p̂ moves doesn't
-//    matter.
+// 3. If an object holds the tool, p̂ moves by many parts at once while the tool hardly moves. Such a batch is correct
+//    if the tool, relative to all objects that it may meet, moves by no more than one part allows. How far p̂ moves
+//    doesn't matter.
 #pragma once
 
 #include "models/rigid/fallback.hpp"
