@@ -41,9 +41,9 @@ class WrenchCompensation {
   [[nodiscard]] double step_noise_N() const noexcept;
   // False if a hand's motion or the sensor's own filter correlates successive samples.
   [[nodiscard]] bool noise_is_white() const noexcept;
-  // The jump of the force during the tare, in S: the mean after the largest change between two samples, less the mean
-  // before it. Zero if this difference is smaller than 0.8 of the largest change, or if another change between two
-  // samples is larger than a fifth of the largest change.
+  // Returns the jump of the force during the tare, in S: the mean of the samples after the largest change between two
+  // samples minus the mean of the samples before this change. Returns zero if this difference is smaller than 0.8 of
+  // the largest change, or if another change between two samples is larger than a fifth of the largest change.
   [[nodiscard]] models::Vec3 tare_jump_S() const noexcept;
   [[nodiscard]] double tare_samples() const noexcept { return static_cast<double>(tare_count_); }
   [[nodiscard]] HeldTool tool() const noexcept { return {mass_kg_, centre_of_mass_S_, handle_S_}; }

@@ -10,7 +10,7 @@ namespace proxarm::controller {
 
 enum class Order : std::uint8_t {
   none,
-  hold,      // in rendering: a controlled stop, after which the drives stay enabled. In freeing: ends freeing
+  hold,      // in rendering: a controlled stop, after which the drives stay enabled; in freeing: the phase ends
   resume,    // in a hold: rendering continues; the force rises over ramp_in_s
   release,   // in a hold: the arm follows the hand slowly, without the scene
   back_off,  // in a hold: the tool moves `value` metres along the last contact's normal

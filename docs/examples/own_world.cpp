@@ -19,11 +19,12 @@ class Torus final : public proxarm::OwnWorld {
     pressed_ = distance_m(p) < 0.0;
     if (!pressed_) return p;
     const Vec3 on_circle = nearest_on_circle(p), way = p - on_circle;
-    const Vec3 out = way.norm() > 0.0 ? way : Vec3(q - on_circle);  // from the circle itself: to where it came from
+    // a p exactly on the circle has no direction outwards: take the one in which q lies
+    const Vec3 out = way.norm() > 0.0 ? way : Vec3(q - on_circle);
     contact_[0].normal = out.normalized();
     return on_circle + tube_m_ * contact_[0].normal;
   }
-  // What presses, for records and summary.
+  // The contact that presses, for records and summary.
   [[nodiscard]] std::span<const proxarm::models::Contact<3>> contacts() const noexcept override {
     return {contact_.data(), pressed_ ? 1U : 0U};
   }

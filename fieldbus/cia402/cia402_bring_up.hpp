@@ -5,8 +5,8 @@
 //   ... the cycle: SYNC, heartbeat, PDOs; the power state machine runs in it ...
 //   leave_operational(network, slots);    // after the goodbye (cia402_goodbye.hpp)
 //
-// Bringing up blocks for a few seconds at most. It throws SetupError that names bus, node, object, found value and
-// expected value. It doesn't enable any drive, because enabling takes controlwords, and only the cycle sends
+// bring_up_drives() blocks for a few seconds at most. It throws SetupError that names bus, node, object, found value
+// and expected value. It doesn't enable any drive, because enabling takes controlwords, and only the cycle sends
 // controlwords.
 #pragma once
 

@@ -45,7 +45,7 @@ class SimulatedCanNetwork final : public CanNetwork {
   // such as that of a suspended process. During a gap all nodes keep running, as on a real bus, and the controller's
   // sleep ends late.
   void follow_real_time();
-  // Longer than a busy machine delays a process.
+  // A busy machine delays a process by less than this.
   static constexpr std::int64_t longest_catch_up_ns = 200'000'000;
   // If a gap is longer, the rest of it is skipped.
   static constexpr std::int64_t longest_gap_ns = 1'000'000'000;

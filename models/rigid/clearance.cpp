@@ -16,9 +16,9 @@ double least_gap_m(RigidState& state, const ToolPose& pose) noexcept {
   double least = std::numeric_limits<double>::infinity(), empty = 0.0;
   state.bodies.drop_carrier();
   for (double far = first_m; far < furthest_m && far > nearest_m;) {
-    state.candidates.count = 0;  // so that no pair counts as pressed
+    state.candidates.count = 0;  // no pair may count as pressed
     state.gather(pose, far);
-    if (state.candidates.crowded) {  // look nearer, or else the last distance within which nothing was is all
+    if (state.candidates.crowded) {  // search nearer; or return the largest distance that was found empty
       if (empty > 0.0) return std::min(empty, overlaps.overlap_m(pose));
       far *= 0.25;
       continue;

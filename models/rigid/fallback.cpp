@@ -5,8 +5,8 @@
 #include <utility>
 
 namespace proxarm::models {
-// Whether the tool may be at a pose, by the sides on which it was: no gap is below 0. Sides say nothing about a pose
-// further away than they reach.
+// Whether all gaps at a pose are at least 0, judged on the sides on which the tool was. False if the pose is beyond the
+// reach of the sides.
 bool Fallback::has_room(const ToolPose& pose) noexcept {
   if (state_->sides.came_m(state_->bodies, pose) > state_->sides.reach_m()) return false;
   search_.find(pose);
@@ -29,9 +29,12 @@ bool Fallback::step_aside(ToolPose& q) noexcept {
   return false;
 }
 
-// On the holder gaps are what they were, and feet lie on their features. Seen from where the tool stays in W, the
-// holder has moved on by the object's way: its foot may be beyond an edge by that, so that nothing holds the tool, or
-// what is behind the edge does.
+// Returns q carried along with the holder: the moving object that pressed most on the tool. Returns q itself if a
+// carrier already carries the tool, or if the pair that pressed most isn't with a moving object.
+//
+// If the tool is carried along with the holder, its gaps to the holder don't change, and each foot stays on its
+// feature. If the tool stayed in W instead, the holder would move under it: the foot could then lie beyond an edge, and
+// nothing, or only the face behind the edge, would hold the tool.
 ToolPose Fallback::along_with_holder(const ToolPose& q) const noexcept {
   if (state_->bodies.has_carrier()) return q;
   const Pair* holder = nullptr;
@@ -44,8 +47,8 @@ ToolPose Fallback::along_with_holder(const ToolPose& q) const noexcept {
   return m.mover.at() * ToolPose{m.from.x, Quaternion(m.from.R)};
 }
 
-// Objects that the tool touches are mostly on the other side of a plane through a contact, and so are their neighbours:
-// those planes are tried first.
+// A plane of contact mostly separates the tool from the object that it touches and from this object's neighbours. So
+// these planes are tried first.
 bool Fallback::stands_in(const ToolPose& pose) noexcept {
   std::array<Vec3, Overlaps::most_planes> normals;
   const LocalProblem& local = state_->local;
@@ -54,20 +57,22 @@ bool Fallback::stands_in(const ToolPose& pose) noexcept {
   return overlaps_.overlap_m(pose, {.enough = -kGap_m, .normals = {normals.data(), count}}) < -kGap_m;
 }
 
-// Where a mesh bends both ways, as at a valley's end, a corner of the tool may be behind faces and have its foot on
-// none of them: nothing then holds it, and it would go in, though all else rests where it did. And among solids an
-// iterate may have left all that pressed in the one before, over an edge, while p̂ is inside.
+// The tool may get into an object in two ways:
+// 1. At a mesh's valley end, where the surface bends both ways, a corner of the tool may be behind faces while its foot
+//    lies on none of them. Nothing then holds the corner.
+// 2. Among solids, an iterate may have left all contacts that pressed in the iterate before, over an edge, while p̂ is
+//    inside.
 bool Fallback::take_back_if_in(const ToolPose& q_old, ToolPose& q) noexcept {
   if (!may_be_in()) return false;
   const bool approaches = state_->bodies.something_approaches();
-  if (approaches) state_->bodies.move_to(1.0);  // all the way, though the tool's parts may have ended before
+  if (approaches) state_->bodies.move_to(1.0);  // to the end of the step, even if the tool's parts ended earlier
   if (!stands_in(q)) return false;
   q = approaches ? out_of_the_way(q_old, q) : q_old;
   return true;
 }
 
-// Where the tool was, or where that is on an object that moves: the first pose that isn't in anything. If there is
-// none, it stays where it is, and has no room there.
+// Returns the first of these poses at which the tool stands in no object: q_old; q_old carried along with one of the
+// moving objects. If there is none, returns q, and the tool is squeezed.
 ToolPose Fallback::out_of_the_way(const ToolPose& q_old, const ToolPose& q) noexcept {
   if (!stands_in(q_old)) return q_old;
   for (const MovingEntry& m : state_->bodies.moving()) {

@@ -1,4 +1,4 @@
-// Where the tool goes if a part of a step has no solution, or leads it into an object.
+// Chooses the tool's pose if a part of a step has no solution or leads the tool into an object.
 #pragma once
 
 #include "models/rigid/overlaps.hpp"
@@ -15,16 +15,18 @@ class Fallback {
         search_(state.bodies, state.candidates, state.sides, attempt, state.touches),
         overlaps_(state.bodies, state.candidates, state.last_planes) {}
 
-  // While an object moves, the tool can't just stay. It goes where it has room: where it was, or where that is on an
-  // object that moves. False: it is squeezed. Precondition: the sides are those of where it was.
+  // Moves the tool to a pose with room: q itself, or the former pose carried along with one of the moving objects.
+  // (While an object moves, the tool can't always stay at q.) Returns false if there is no such pose; the tool is then
+  // squeezed. Precondition: the sides were taken at the former pose.
   bool step_aside(ToolPose& q) noexcept;
-  // Where a part of the step begins to look for the tool: where it was on the object that held it most, as far as that
-  // has moved on. Precondition: the sides are those of where the tool was.
+  // Returns the pose from which a part of the step starts its iteration: the former pose, carried along with the moving
+  // object that held the tool most. Precondition: the sides were taken at the former pose.
   [[nodiscard]] ToolPose along_with_holder(const ToolPose& q) const noexcept;
 
-  // Whether the tool stands in an object at a pose, by its whole bodies. Costs a look at all of them.
+  // Whether the tool stands in an object at a pose. Compares whole bodies, which takes a look at each object.
   [[nodiscard]] bool stands_in(const ToolPose& pose) noexcept;
-  // The same, if the step may have led it in; then q goes back to where it was, or where that is now.
+  // If the step may have led the tool into an object, and stands_in(q) is true, sets q back to q_old, or to q_old
+  // carried along with a moving object. Returns whether it did so.
   bool take_back_if_in(const ToolPose& q_old, ToolPose& q) noexcept;
   [[nodiscard]] bool may_be_in() const noexcept { return state_->bodies.setup().dense || attempt_->lost_contact; }
 

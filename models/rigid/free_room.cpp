@@ -10,13 +10,15 @@
 namespace proxarm::models {
 namespace {
 
-// A distance is known well enough when its bounds differ by this share, or after this many supports.
+// The search for a distance ends when the lower bound is at least this share of the upper bound, or after this many
+// evaluations of support points.
 constexpr double kKnown = 0.8;
 constexpr int kSupports = 24, kNormals = 6;
-// A part with more points than this is replaced by its box.
+// A solid with more points than this is replaced by its box.
 constexpr std::size_t kManyPoints = 256;
 
-// The convex hull of a solid's points and rims with its radius around it, or of its box if there are many points.
+// The convex hull of a solid's points and rims; if the solid has many points, the hull of its box. The solid's radius
+// is around the hull.
 class Hull {
  public:
   Hull(const Solid* solid, const Bounds& box) noexcept : solid_(solid), box_(&box) {
@@ -27,7 +29,7 @@ class Hull {
   [[nodiscard]] int cost() const noexcept {
     return solid_ == nullptr ? 1 : 1 + static_cast<int>(solid_->points.size() / 8);
   }
-  // The furthest along n.
+  // Returns the point of the hull that is furthest along n.
   [[nodiscard]] Vec3 furthest(const Vec3& n) const noexcept {
     if (solid_ == nullptr) return (n.array() < 0.0).select(box_->low, box_->high);
     Vec3 out = Vec3::Zero();
@@ -52,14 +54,14 @@ class Hull {
   double radius_ = 0.0;
 };
 
-// Lower bound of the distance between two hulls: the gap between them along a plane's normal. Gilbert's algorithm ("An
-// iterative procedure for computing the minimum of a quadratic form on a convex set", 1966) turns the plane, from the
-// normals that were tried.
+// Computes a lower bound of the distance between two hulls: the gap between the hulls along a normal. Starting from the
+// best normal that was tried, Gilbert's algorithm improves the normal ("An iterative procedure for computing the
+// minimum of a quadratic form on a convex set", 1966).
 class BetweenHulls {
  public:
   BetweenHulls(const Hull& own, const View& at, const Hull& other) noexcept : own_(&own), other_(&other), at_(&at) {}
 
-  // Tries a plane with this normal, which points out of the object.
+  // Tries a normal. It points out of the object.
   void try_normal(const Vec3& n) noexcept {
     const Vec3 s = nearest(n);
     if (const double gap = n.dot(s); gap > most_) {
@@ -94,7 +96,7 @@ class BetweenHulls {
   int looks_ = 0;
 };
 
-// A part of the tool over a flat or hollow object. Nothing: the object has another shape.
+// Returns the gap between a part of the tool and a flat or hollow object, m; nullopt if the object has another shape.
 std::optional<double> room_in_field(const Solid& own, const RigidEntry& entry, const View& at,
                                     int& looks_left) noexcept {
   std::optional<double> room;

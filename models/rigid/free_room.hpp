@@ -1,12 +1,13 @@
-// How far the tool is from all that it may meet, at least: from whole bodies, where no pairs of features are gathered.
+// Computes a lower bound of the distance between the tool and the objects. It compares whole bodies, so no pairs of
+// features are needed.
 #pragma once
 
 #include "models/rigid/rigid_state.hpp"
 
 namespace proxarm::models {
 
-// Lower bound of the distance between the tool and all objects that are close, at a pose, m; 0 if they may touch. The
-// search ends at `enough_m`. Its cost is taken from `looks_left`.
+// Returns a lower bound of the distance between the tool at a pose and all objects that are close, m; at most
+// `enough_m`; 0 if the tool may touch an object. The cost of the search is subtracted from `looks_left`.
 [[nodiscard]] double free_room_m(const RigidState& state, const ToolPose& pose, double enough_m,
                                  int& looks_left) noexcept;
 

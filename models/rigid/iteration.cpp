@@ -7,39 +7,43 @@ namespace proxarm::models {
 namespace {
 
 constexpr int kMostPoses = 50;
-// Newton's iteration with bends: a solution before a step of kNear_m needn't be exact. A local problem that is solved
-// to this share of the last step leads as near.
+// With bends the iteration is Newton's method. As long as its steps are above kNear_m, local problems needn't be solved
+// exactly: solved to this share of the last step, they lead equally near to the fixed point.
 constexpr double kRoughShare = 1e-5;
 constexpr double kNear_m = 1e-9;
-// Pairs further away than this many times the way to p̂ aren't looked at: a stiff coupling rarely yields by more than
-// that way, to either side. If it does, all pairs are looked at.
+// Pairs further away than this many times the distance from q to p̂ aren't looked at, because a stiff coupling rarely
+// yields by more than this distance. If it does, all pairs are looked at.
 constexpr double kWithin = 2.0;
-// By how much normals may still turn in the last step, rad, whose forces are those of normals before it: of 10 N that
-// is a tenth of a nanonewton across.
+// Largest turn of the normals in the last step of the iteration, rad. The reported forces belong to the normals before
+// this step. With 10 N the error is a tenth of a nanonewton.
 constexpr double kTurned = 1e-11;
-// A tool that rests among more contacts than hold it may have a solution at one pose and, for rounding, none at the
-// next, or steps that rounding of its forces keeps from getting smaller. After a step below this size the first
-// solution is taken: normals are right to 1e-8 then.
+// A tool may rest among more contacts than are needed to hold it. Because of rounding, the local problem may then have
+// a solution at one pose and none at the next pose, or the steps may not get smaller. So a solution is kept once a step
+// is below this size; the normals are then correct to 1e-8.
 constexpr double kRest_m = 1e-13;
-// From this pose on only a share of a step is taken if steps swing to and fro: with bends, and later if two features
-// don't hold together, of which either one leads to where only the other is found.
+// From the pose with this number on, only a share of a step is taken if the steps swing to and fro. kWhole is for
+// problems with bends. kWholeFlat is for problems without bends; their steps swing if each of two features leads to a
+// pose where only the other feature is found.
 constexpr int kWhole = 3, kWholeFlat = 10;
 constexpr double kLeastShare = 0.125;
-// But not of steps that rounding makes, where contacts hold each other: 1e-17 m of their gaps are 1e7 times that in the
-// local problem's forces, and friction turns some of it into a way (contact_problem.cpp, kStiff).
+// Steps below this size are taken whole, because they come from rounding. Where contacts press against each other, the
+// local problem multiplies a rounding of 1e-17 m in the gaps by 1e7, and friction turns some of this into a motion
+// (contact_problem.cpp, kStiff).
 constexpr double kNoise_m = 1e-11;
-// From this pose on features count as far beside their ends as the last step went: two neighbours, of which either one
-// leads to where only the other is found, then hold together. As steps become smaller so does this reach, and the
-// solution in the end is theirs.
+// From the pose with this number on, a foot may lie beside its feature by up to the size of the last step. If each of
+// two neighbouring features leads to a pose where only the other is found, both features then count together. The reach
+// shrinks with the steps, so in the end both feet lie on their features.
 constexpr int kToAndFro = 6;
 constexpr double kBesideAtMost_m = 1e-3;
 
 }  // namespace
 
-// The share of a step that is taken, from the share of the step before and both steps: the part of a step along the
-// last one says how far the whole of that would have gone too far (Aitken's rule). The place of a contact that sticks
-// may go far along two rods with next to no turn, and the torque of its friction with it, which the local problem
-// doesn't know: whole steps then grow.
+// Returns the share of a step that is taken, by Aitken's rule: `share` is the share taken of the step before, and the
+// component of the step `delta` along the step `last` shows by how much a whole step would have overshot.
+//
+// Damping is needed for two rods that stick to each other. A very small turn may move their place of contact far along
+// the rods, and this changes the torque of the friction. The local problem doesn't contain this change, so whole steps
+// would grow.
 double Iteration::damped(double share, const Twist& delta, const Twist& last) const noexcept {
   const double reach_m = state_->bodies.setup().reach_m, lever2 = reach_m * reach_m;
   const auto product = [&](const Twist& a, const Twist& b) {
@@ -76,7 +80,8 @@ Iteration::Next Iteration::iterate(const ToolPose& p_hat, const ToolPose& q_old,
   const bool roughly = attempt_->bends && at.k > 0 && at.last_m > kNear_m;
   const double rough = roughly ? kRoughShare * std::min(at.last_m / state_->bodies.motion_m(q, p_hat), 1.0) : 0.0;
   const double still_m = attempt_->bends && !roughly && at.last_m < kNear_m ? at.rounding_m : 0.0;
-  // (An object may have moved on from under the tool since the part before.)
+  // In the first iterate, contacts of the part before count only if an object moves, which may have moved away from the
+  // tool.
   const bool pressed = (at.k > 0 || state_->bodies.something_approaches()) && state_->candidates.pressed.count > 0;
   Twist delta;
   const bool solved = local_step_.solve(q, e, q_old, rough, still_m, delta);
@@ -87,7 +92,7 @@ Iteration::Next Iteration::iterate(const ToolPose& p_hat, const ToolPose& q_old,
   return free ? leave(p_hat, at, q) : go_on(e, delta, solved, roughly, at, q);
 }
 
-// Nothing holds the tool on the way to p̂.
+// Moves the tool to p̂, since nothing holds it.
 Iteration::Next Iteration::leave(const ToolPose& p_hat, Progress& at, ToolPose& q) noexcept {
   if (q == p_hat) return Next::solved;
   q = p_hat;
@@ -106,8 +111,8 @@ Iteration::Next Iteration::go_on(const Twist& e, const Twist& solution, bool sol
   if (size <= kStill_m) at.share = 1.0;
   at.last_delta = delta;
   q = moved(q, at.share * delta);
-  // After this step the last ratio times it is left to go. With bends the step counts as well: its forces are those of
-  // the normals before it.
+  // The motion that remains after this step is about the step times the last ratio of two steps. With bends the size of
+  // the step matters as well, because the forces belong to the normals before the step.
   const bool on = local_step_.on_features();
   const bool whole = at.share == 1.0 && !roughly && on && (!attempt_->bends || size <= kStill_m);
   const bool small = std::isfinite(at.last_m) && size < 0.1 * at.last_m &&
@@ -117,7 +122,7 @@ Iteration::Next Iteration::go_on(const Twist& e, const Twist& solution, bool sol
   const bool rests = solved && !roughly && on && size < at.rest_m;
   if ((ends || rests) && local_step_.bar_what_reaches_beyond(q)) {
     at.last_m = std::numeric_limits<double>::infinity();
-    attempt_->lost_contact = true;  // the barred pair may have been all that held the tool
+    attempt_->lost_contact = true;  // the barred pair may have been the only pair that held the tool
     return Next::iterate;
   }
   if (ends) return solved ? Next::solved : Next::unsolved;

@@ -1,10 +1,11 @@
-// The iteration of a part of a step: from a pose on, the local problem's solution is the next pose, until nothing
-// moves.
+// Iterates a part of a step: the solution of the local problem at a pose is the next pose, until the pose no longer
+// changes.
 //
-// A fixed point is exact, since at δ = 0 nothing is linearised. The iteration converges by the ratio of the step's
-// penetration to the radius of curvature, a thousandth or less. Where surfaces conform (a peg in its hole) that radius
-// is their clearance, and the ratio far above one: there the gaps' curvature goes into the local problem as well
-// (bends.hpp), which makes this Newton's method.
+// 1. A fixed point is exact, because linearisation makes no error at δ = 0.
+// 2. In each iterate the error shrinks by the ratio of the step's penetration to the radius of curvature, a thousandth
+//    or less.
+// 3. If surfaces fit closely (a peg in a hole), the clearance takes the place of the radius, and the ratio is far above
+//    one. So the gaps' curvature is added to the local problem (bends.hpp), and the iteration is Newton's method.
 #pragma once
 
 #include <limits>
@@ -18,11 +19,11 @@ class Iteration {
   Iteration(RigidState& state, Attempt& attempt) noexcept
       : state_(&state), attempt_(&attempt), local_step_(state, attempt) {}
 
-  // From q on. False: no solution was found, or the budget is used up.
+  // Iterates from q and writes the result to q. Returns false if no solution was found or if the budget is used up.
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
 
   void collect_contacts(const ToolPose& pose) noexcept;
-  // The contacts of the last solution are dropped: the tool left them.
+  // Drops the contacts of the last solution, because the tool has left them.
   void drop_contacts() noexcept;
 
  private:
@@ -30,8 +31,9 @@ class Iteration {
   struct Progress {
     double rounding_m = 0.0, rest_m = 0.0;
     int k = 0;
-    double last_m = std::numeric_limits<double>::infinity();  // size of the step before; infinite if there was none
-    double share = 1.0;                                       // of a step that is taken
+    // Size of the step before, m; infinite if there was no step
+    double last_m = std::numeric_limits<double>::infinity();
+    double share = 1.0;  // which share of a step is taken
     Twist last_delta = Twist::Zero();
     ToolPose resting{};
   };

@@ -1,4 +1,4 @@
-// The local problem at a pose, with its contacts and their solution.
+// Stores the local problem at a pose, its contacts and their solution.
 #pragma once
 
 #include <array>
@@ -8,22 +8,23 @@
 
 namespace proxarm::models {
 
-// A step of the iteration that counts as none, m. With bends, at a clearance of ten micrometres, it turns normals by at
-// most 1e-10 rad.
+// A step of the iteration below this size counts as zero, m. With bends and a clearance of ten micrometres, such a step
+// turns normals by at most 1e-10 rad.
 inline constexpr double kStill_m = 1e-15;
 
 struct LocalProblem {
   Mat6 K = Mat6::Identity();
   ContactProblem problem;
   std::array<LinearContact, ContactProblem::most> contacts;
-  std::array<std::uint16_t, ContactProblem::most> touch_of{};  // index in Touches, of each contact
-  std::array<Mat3, ContactProblem::most> axes;                 // normal and two tangents, columns, of each contact
+  std::array<std::uint16_t, ContactProblem::most> touch_of{};  // for each contact its index in Touches
+  std::array<Mat3, ContactProblem::most> axes;  // for each contact the normal and two tangents, as columns
   std::size_t count = 0;
-  bool lies_along = false;  // straight features, one of them round, pressed along each other in the last solution
-  bool kept = false;        // the last solution has the forces of the one before
+  bool lies_along = false;  // in the last solution a pair with is_along_side() pressed
+  bool kept = false;        // the last solution has the forces of the solution before
 };
 
-// A force in axes of normal and tangents, N, put into the Coulomb cone.
+// Returns the force f (normal, tangents; N) after moving it into the Coulomb cone: a tension becomes 0, and the
+// tangential part is shortened.
 [[nodiscard]] Vec3 in_cone(Vec3 f, double mu) noexcept;
 
 }  // namespace proxarm::models

@@ -10,24 +10,24 @@
 namespace proxarm::models {
 namespace {
 
-// Cost of a local problem that has no solution, or none that is found, in poses.
+// Cost of a local problem for which no solution is found, in poses.
 constexpr int kHard = 40;
-// A contact that bears less than this share of the greatest force may be left out if nothing else helps.
+// A contact whose force is below this share of the largest force may be left out if no other solution is found.
 constexpr double kIdle = 1e-3;
-// Contacts that are passed by less than rounding don't join.
+// A contact joins the local problem only if δ passes it by more than this rounding.
 constexpr double kPassed_m = 1e-16;
-// If more than a few are passed, this many join at a time.
+// If δ passes more than kFewPassed contacts, or if the setup is dense, only kAtATime contacts join in a round.
 constexpr std::size_t kAtATime = 4, kFewPassed = 12;
-// If there is no room for all, none that is passed by less than a hundredth of what a gap may be short of counts as
-// missing.
+// If there is no room for all contacts, a contact that δ passes by less than this (a hundredth of kGap_m) doesn't count
+// as missing.
 constexpr double kPassedAmongMany_m = 1e-14;
 constexpr int kRounds = 16;
-// It pays to know which pairs are far if there are this many.
+// With at least this many pairs, leaving out far pairs saves time.
 constexpr std::size_t kManyPairs = 12;
-// What the wrench may lack after the last step of the iteration: of 10 N, a third of 1e-10 N.
+// Largest relative error of the wrench's balance after the last step of the iteration: with 10 N, a third of 1e-10 N.
 constexpr double kBalance = 3e-12;
 
-// A pair's linearised gap after a twist.
+// Returns the linearised gap of a touch after a twist.
 double gap_after(const Found& found, const ToolPose& pose, const Twist& xi) noexcept {
   const Vec3 lever = found.touch.point - pose.position;
   return found.touch.gap + found.touch.normal.dot(xi.head<3>() + xi.tail<3>().cross(lever));
@@ -66,9 +66,11 @@ void LocalStep::linearise(const Found& found, const ToolPose& pose, const ToolPo
   out.f = force != nullptr ? Vec3(axes.transpose() * *force) : Vec3(Vec3::Zero());
 }
 
-// A face that comes down on a fine mesh passes many of its vertices at once, as a prism of many sides does that stands
-// up on a table, and few of them will hold it: those that it passes by most join first, kAtATime in a round. Returns
-// the gap below which contacts join; if few are passed, that is any.
+// Returns the gap below which contacts join the local problem. If δ passes only few contacts and the setup isn't dense,
+// this is -kPassed_m, so that all these contacts join.
+// Reason: if a face comes down on a fine mesh, δ passes many vertices at once, and few of them will hold the face. (A
+// prism with many sides that stands up on a table is similar.) So the contacts that δ passes by most join first,
+// kAtATime in a round.
 double LocalStep::worst_passed(const Twist& xi, const ToolPose& pose) const noexcept {
   std::array<double, kAtATime + 1> least;
   least.fill(-kPassed_m);
@@ -83,15 +85,16 @@ double LocalStep::worst_passed(const Twist& xi, const ToolPose& pose) const noex
     }
   }
   if (!bodies_->setup().dense && passed <= kFewPassed) return -kPassed_m;
-  // Many contacts may be passed by the same distance to the bit.
+  // δ may pass many contacts by exactly the same distance.
   return least.front() == least.back() ? std::nextafter(least.back(), 0.0) : least.back();
 }
 
-// Takes in the contacts that δ passes; in the first round also those that pressed last time. False: there are none.
+// Adds the contacts that δ passes to the local problem; in the first round also the contacts that pressed in the last
+// solution. Returns false if there is none.
 bool LocalStep::join(const ToolPose& pose, const ToolPose& q_old, const Twist& delta, bool first,
                      double still_m) noexcept {
   const double worst = worst_passed(delta, pose);
-  const bool some = worst < -kPassed_m;  // not all that are passed
+  const bool some = worst < -kPassed_m;  // not all passed contacts join in this round
   std::size_t joined = 0;
   const std::size_t before = local_->count;
   for (std::size_t i = 0; i < touches_->count; ++i) {
@@ -110,7 +113,8 @@ bool LocalStep::join(const ToolPose& pose, const ToolPose& q_old, const Twist& d
     local_->touch_of[local_->count] = static_cast<std::uint16_t>(i);
     LinearContact& linear = local_->contacts[local_->count];
     linearise(found, pose, q_old, linear, local_->axes[local_->count]);
-    // A contact that pressed is still at its place; otherwise forces that hold each other would follow rounding.
+    // The gap of a contact that pressed is set to exactly 0. Otherwise contacts that press against each other would get
+    // forces from rounding.
     if (pressed && local_->lies_along && std::abs(linear.c[0]) <= still_m) linear.c[0] = 0.0;
     ++local_->count;
   }
@@ -119,7 +123,8 @@ bool LocalStep::join(const ToolPose& pose, const ToolPose& q_old, const Twist& d
 
 bool LocalStep::may_leave_out() const noexcept { return candidates_->count >= kManyPairs && !bodies_->setup().bends; }
 
-// Contacts that neither pressed last time nor are passed on the way to p̂ join when a solution passes them.
+// A contact joins in the first round if it pressed in the last solution or if the motion to p̂ passes it. Other
+// contacts join when a solution passes them.
 bool LocalStep::solve(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, double still_m,
                       Twist& delta) noexcept {
   Twist e_coupled = couple(pose, e);
@@ -148,7 +153,8 @@ bool LocalStep::solve(const ToolPose& pose, const Twist& e, const ToolPose& q_ol
   return solved;
 }
 
-// Puts the coupling with the bends of the gaps that pressed into the local problem, and returns ẽ (bends.hpp).
+// Sets the stiffness of the local problem to the coupling plus the bends of the gaps that pressed, and returns ẽ
+// (bends.hpp).
 Twist LocalStep::couple(const ToolPose& pose, const Twist& e) noexcept {
   if (!bodies_->setup().bends && !bodies_->setup().edges_bend) return e;
   Mat6 K = local_->K;
@@ -167,7 +173,7 @@ Twist LocalStep::couple(const ToolPose& pose, const Twist& e) noexcept {
   return bent ? local_->problem.yield_to(local_->K * e) : e;
 }
 
-// Touches are reported where they go with this solution, not where they were linearised.
+// Moves the touches by δ, so that the places of the solution are reported instead of the places of the linearisation.
 void LocalStep::move_touches(const ToolPose& pose, const Twist& delta) noexcept {
   for (std::size_t k = 0; k < local_->count; ++k) {
     Found& found = touches_->found[local_->touch_of[k]];
@@ -181,9 +187,10 @@ void LocalStep::move_touches(const ToolPose& pose, const Twist& delta) noexcept 
   }
 }
 
-// Whether the forces of the last solution hold the tool here, to within rounding. If more contacts hold it than are
-// needed, many forces do, and friction makes a pose of each: a local problem that is solved anew comes to other forces
-// each time, as the gaps' rounding has it, and the tool never comes to rest.
+// Whether the forces of the last solution still hold the tool at this pose, to within rounding. Reason: if more
+// contacts hold the tool than are needed, many sets of forces are possible, and by friction each set belongs to a
+// slightly different pose. A new solution would choose another set each time, depending on the rounding of the gaps,
+// and the tool would never come to rest.
 bool LocalStep::still_holds(const ToolPose& pose, const Twist& e, double still_m, Twist& delta) noexcept {
   const Twist before = delta;
   bool still = local_->problem.holds(e, contacts(), delta);
@@ -196,8 +203,8 @@ bool LocalStep::still_holds(const ToolPose& pose, const Twist& e, double still_m
   return still;
 }
 
-// With sides along each other the bends have a condition of 1e10, and no forces are found that hold to within rounding.
-// Without the bends the iteration goes on, if more slowly.
+// Solves the local problem without bends. If sides lie along each other, the stiffness with bends has a condition
+// number of 1e10, and rounding may prevent a solution. Without bends the iteration converges more slowly.
 bool LocalStep::solve_unbent(const Twist& e, double rough, Twist& e_coupled, Twist& delta) noexcept {
   if (!local_->lies_along || --attempt_->retries_left < 0) return false;
   local_->problem.set_stiffness(local_->K);
@@ -206,9 +213,10 @@ bool LocalStep::solve_unbent(const Twist& e, double rough, Twist& e_coupled, Twi
   return local_->problem.solve(e, contacts(), delta, rough);
 }
 
-// Where an edge of the tool lies on a vertex of a mesh, all edges there hold it at one place, most of them with next to
-// no force, and rounding decides which: no forces are found. Without those the others hold it alone, if then nothing is
-// passed by more than half of what a gap may be short of.
+// Solves the local problem without the contacts that have hardly any force. If an edge of the tool lies on a vertex of
+// a mesh, all the vertex's edges hold the tool at one place, most of them with almost no force. Rounding then decides
+// which contacts press, and no solution may be found. Returns false if no solution is found, or if the solution passes
+// a contact that was left out by more than half of kGap_m.
 bool LocalStep::solve_fewer(const ToolPose& pose, const Twist& e, double rough, Twist& delta) noexcept {
   double most = 0.0;
   for (const LinearContact& contact : contacts()) most = std::max(most, contact.f[0]);
@@ -270,15 +278,17 @@ bool LocalStep::bar_what_reaches_beyond(const ToolPose& pose) noexcept {
   return some;
 }
 
-// Rotations aren't vectors: log(exp δ exp e) = δ + e + δ × e/2 to second order.
+// Rotations aren't vectors: log(exp δ exp e) = δ + e + δ × e/2 to second order. The last term is the error of the
+// balance.
 bool LocalStep::stays_balanced(const Twist& delta, const Twist& e) const noexcept {
   Twist bent = Twist::Zero();
   bent.tail<3>() = 0.5 * Vec3(delta.tail<3>()).cross(Vec3(e.tail<3>()));
   return (local_->K * bent).squaredNorm() <= kBalance * kBalance * (local_->K * (e + delta)).squaredNorm();
 }
 
-// Normals of the tool's faces and of edges turn as the tool turns, those of round bodies as it moves on. (For hollow
-// objects the iteration asks for more.)
+// A normal turns if the tool turns, for faces and edges of the tool; the normal of a round body also turns if the place
+// of contact moves. The normals of the object's faces don't turn. Hollow objects are left out, because the iteration
+// has a stricter condition with bends.
 double LocalStep::normals_turn_by(const Twist& delta) const noexcept {
   double bend = 0.0;
   bool turns = false;
@@ -296,11 +306,12 @@ double LocalStep::normals_turn_by(const Twist& delta) const noexcept {
   return turned + bend * (delta.head<3>().norm() + bodies_->setup().reach_m * turned);
 }
 
-// The local problem is solved to 1e-10 of the free motion's press where contacts hold each other. The part of a force
-// that is out of its cone is taken off, and the tool moves by what the wrenches then lack to balance: 1e-9 N is 1e-16 m
-// on a coupling of 10 N/µm. A coupling of 10 N/mm that presses by centimetres yields to 1e-10 of that by picometres: a
-// correction that would use up half of what a gap may be short of is left out. With bends the coupling isn't K, and the
-// law is met more closely.
+// 1. If contacts press against each other, the local problem is solved only to 1e-10 of the wrench K e.
+// 2. The part of a force that is outside of its cone is removed. δ is corrected such that the wrenches balance again:
+//    an error of 1e-9 N moves the tool by 1e-16 m on a coupling of 10 N/µm.
+// 3. A coupling of 10 N/mm that presses by centimetres would yield by picometres. A correction of more than half of
+//    kGap_m is left out.
+// 4. With bends the stiffness isn't K, and the local problem is solved more accurately, so there is no correction.
 void LocalStep::balance(const Twist& e, Twist& delta) noexcept {
   if (attempt_->bends) return;
   const Twist wrench = local_->K * (e + delta);

@@ -1,5 +1,5 @@
-// Makes and solves the local problem at a pose: the linearised contacts that hold the tool, their solution δ, and
-// whether a step may end on it.
+// Sets up the local problem at a pose (the linearised contacts that hold the tool), solves it for δ, and judges whether
+// the iteration may end with this solution.
 #pragma once
 
 #include <span>
@@ -11,7 +11,7 @@ namespace proxarm::models {
 
 class LocalStep {
  public:
-  // How many contacts may be looked at in the local problems of a step, some 0.2 µs each.
+  // How many contacts the local problems of a step may look at; each costs some 0.2 µs.
   static constexpr int kWork = 1200;
 
   LocalStep(RigidState& state, Attempt& attempt) noexcept
@@ -24,23 +24,23 @@ class LocalStep {
 
   void find(const ToolPose& pose, double within_m = Touches::everywhere_m) noexcept { search_.find(pose, within_m); }
 
-  // Solves the local problem at a pose that is e off p̂: δ is the next step of the iteration. `rough`: as
-  // in ContactProblem::solve(), 0 is exact; `still_m`: rounding, if the last solution may hold already, else 0. False:
-  // no solution was found.
+  // Solves the local problem at a pose; δ is the next step of the iteration. `e`: the twist from p̂ to the pose.
+  // `rough`: as in ContactProblem::solve(); 0 is exact. `still_m`: the rounding of gaps, m, if the forces of the last
+  // solution may be kept; else 0. Returns false if no solution was found.
   bool solve(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, double still_m,
              Twist& delta) noexcept;
-  // Corrects δ so that the wrenches balance after each force is put into its cone.
+  // Moves each force into its Coulomb cone, and corrects δ such that the wrenches balance.
   void balance(const Twist& e, Twist& delta) noexcept;
 
-  // Whether all that presses has its foot on the feature that it presses on, to within rounding.
+  // Whether the foot of each contact that presses lies on its feature, to within rounding.
   [[nodiscard]] bool on_features() const noexcept;
-  // Whether the wrench is balanced after δ, at a pose that is e off p̂.
+  // Whether the wrenches still balance after δ. `e`: the twist from p̂ to the pose.
   [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
-  // By how much δ turns the normals of what presses at most, rad.
+  // Returns an upper bound of the turn of the pressing contacts' normals by δ, rad.
   [[nodiscard]] double normals_turn_by(const Twist& delta) const noexcept;
-  // Bars the pairs that press through a plane that one of their bodies reaches beyond. Whether there were any.
+  // Bars the pressing pairs that fulfil reaches_beyond(). Returns whether there were any.
   bool bar_what_reaches_beyond(const ToolPose& pose) noexcept;
-  // Whether pairs that are far may be left out. With bends the coupling depends on the pairs that pressed.
+  // Whether far pairs may be left out. False with bends, because the stiffness then depends on all pairs that pressed.
   [[nodiscard]] bool may_leave_out() const noexcept;
   void drop_contacts() noexcept;
 

@@ -13,12 +13,13 @@
 namespace proxarm::models {
 namespace {
 
-// Nothing for an open mesh, which has no inside.
+// Returns whether the tool should be inside a mesh; nullopt for an open mesh, which has no inside.
 std::optional<bool> should_be_inside(const RigidEntry& mesh) noexcept {
   return mesh.held != 0.0 ? std::optional<bool>(mesh.object.inside_out) : std::nullopt;
 }
 
-// A part of the tool in an object; 0 or more if it stands in nothing. Precondition: the object is a solid or a mesh.
+// Returns how deep a part of the tool stands in an object, negative, m; 0 or more if it doesn't. Precondition: the
+// object is a solid or a mesh.
 double overlap_of(const RigidPart& part, const RigidEntry& entry, const View& at, const Apart& apart) noexcept {
   if (const TriangleFeatures* mesh = entry.mesh()) {
     const std::optional<bool> inside = should_be_inside(entry);
@@ -61,7 +62,8 @@ double Overlaps::overlap_m(const ToolPose& pose, const Apart& apart) noexcept {
     const bool moves = bodies_->moves(entry);
     if ((e.solid() == nullptr && !is_mesh) || (moves && !bodies_->moving(entry).close)) continue;
     const View at = bodies_->seen_from(entry, tool);
-    // (A tool beyond a mesh that it should be inside of is on the wrong side of it.)
+    // A far object is skipped, except a mesh that should enclose the tool: a tool outside of such a mesh is on the
+    // wrong side.
     const bool beyond = distance2_to_box(at.x, e.bounds) > setup.reach_m * setup.reach_m;
     if (beyond && !e.object.inside_out) continue;
     for (std::size_t k = 0; k < setup.parts.size(); ++k) {

@@ -1,7 +1,7 @@
-// Whether the tool stands in an object, judged from whole bodies instead of pairs of features.
+// Measures whether the tool stands in an object. It compares whole bodies instead of pairs of features.
 //
-// Gaps of features hold on the side on which the tool was. Where it is inside of a solid, or stands in a surface, they
-// say nothing.
+// This is needed because gaps of features are valid only on the side on which the tool was. If the tool is inside a
+// solid or stands in a surface, gaps don't show it.
 #pragma once
 
 #include "models/rigid_features/mesh_overlap.hpp"
@@ -11,13 +11,13 @@ namespace proxarm::models {
 
 class Overlaps {
  public:
-  static constexpr std::size_t most_planes = 8;  // to try first: more contacts than hold a tool
+  static constexpr std::size_t most_planes = 8;  // planes to try first; a tool is held by fewer contacts
 
   Overlaps(const RigidBodies& bodies, const Candidates& candidates, LastPlanes& last_planes) noexcept
       : bodies_(&bodies), candidates_(&candidates), last_planes_(&last_planes) {}
 
-  // How deep the tool stands in an object at a pose, m, negative; infinite if it stands in none. Only objects that are
-  // close count. On the wrong side of a mesh it is the distance from the surface.
+  // Returns how deep the tool at a pose stands in an object, negative, m; +infinity if it stands in no object. Only
+  // close objects count. If the tool is on the wrong side of a mesh, the result is minus the distance from the surface.
   [[nodiscard]] double overlap_m(const ToolPose& pose, const Apart& apart = {}) noexcept;
 
  private:

@@ -1,4 +1,4 @@
-// All that a rigid world keeps from one step to the next.
+// Stores what a rigid world keeps from one step to the next.
 #pragma once
 
 #include <memory>
@@ -15,13 +15,13 @@ namespace proxarm::models {
 
 struct RigidState {
   explicit RigidState(std::shared_ptr<const RigidSetup> setup) : bodies(std::move(setup)), candidates(bodies.setup()) {
-    // With bends most local problems of the iteration are solved roughly, and a peg that goes by the closed form ends
-    // more often in a jam that has no solution: in 17 of 8,000 steps instead of none.
+    // The closed form isn't used with bends: a peg in a hole would then end more often in a jam without a solution, in
+    // 17 of 8,000 steps instead of none. (With bends most local problems are solved roughly.)
     local.problem.use_closed_form(!bodies.setup().bends);
   }
 
   void gather(const ToolPose& pose, double reach_m) noexcept;
-  // The same, only if the tool at a pose has left half of what was gathered. Whether it had.
+  // Gathers pairs anew if the tool has moved by more than half of the pairs' reach. Returns whether it gathered.
   bool gather_if_far(const ToolPose& pose) noexcept;
   void take_sides(const ToolPose& pose, double far_m) noexcept { sides.take(bodies, candidates.all(), pose, far_m); }
 
@@ -32,8 +32,9 @@ struct RigidState {
   LocalProblem local;
   StepContacts contacts;
   LastPlanes last_planes;
-  ToolPose q;                    // where the last step ended
-  double empty_around_m = -1.0;  // nothing is nearer than this around the pose of the last gathering; −1: not known
+  ToolPose q;  // pose at which the last step ended
+  // No object is nearer than this to the tool at the pose of the last gathering, m; −1: not known
+  double empty_around_m = -1.0;
   bool unresolved = false, squeezed = false;
 };
 

@@ -9,11 +9,11 @@
 namespace proxarm::models {
 namespace {
 
-// A part of a step moves no point of the tool by more than this share of the least thickness of what may meet. Features
-// that were up to twice as far behind another one may come to lie in front of it, as where an edge leaves the end of
-// one edge for the next, but never those of a far side.
+// A part of a step moves each point of the tool by at most this share of the thickness of the thinnest part or object.
+// The sides reach twice as far as this motion, so that a feature still counts when an edge passes from the end of one
+// edge to the next. They never reach to features on a body's far side.
 constexpr double kPart = 0.2;
-constexpr int kMostPartsOfMoving = 1 << 16;  // among objects that move: batches take many parts at once
+constexpr int kMostPartsOfMoving = 1 << 16;  // with moving objects, because batches take many parts at once
 constexpr int kRetries = 6;
 
 }  // namespace
@@ -41,7 +41,8 @@ void RigidStep::take(const Mat6& K, const ToolPose& p_hat, ToolPose q_old) noexc
   state_->contacts.judge_slips(bodies, q_old, state_->q);
 }
 
-// Whether nothing comes near in this step. Gathers the pairs anew if the tool has come too far for them.
+// Whether no object comes near the tool in this step. Gathers the pairs anew if the tool has moved too far since the
+// last gathering.
 bool RigidStep::passes_freely(const ToolPose& q_old, double far_m) noexcept {
   const Candidates& candidates = state_->candidates;
   double came = candidates.came_m(state_->bodies, q_old);
@@ -51,7 +52,7 @@ bool RigidStep::passes_freely(const ToolPose& q_old, double far_m) noexcept {
     came = candidates.came_m(state_->bodies, q_old);
   }
   state_->empty_around_m = -1.0;
-  // (If much was near, pairs may be gathered less far around than the step's way.)
+  // If many features are near, the reach of the pairs may be smaller than the motion of the step.
   if (candidates.count != 0 || !(came + far_m < candidates.gathered_reach_m)) return false;
   state_->empty_around_m = candidates.gathered_reach_m;
   return true;
@@ -60,7 +61,7 @@ bool RigidStep::passes_freely(const ToolPose& q_old, double far_m) noexcept {
 RigidStep::Plan RigidStep::plan(const ToolPose& p_hat, const ToolPose& q_old, double far_m) const noexcept {
   const RigidBodies& bodies = state_->bodies;
   const double reach = state_->candidates.gathered_reach_m;
-  // If all that the step can come near is known, one part may go as far.
+  // If the pairs contain all features that the step can come near, a part may be as long as the reach.
   const bool all_known = !bodies.setup().dense && state_->candidates.came_m(bodies, q_old) + 2.0 * far_m < reach;
   const double limit = std::min(kPart * bodies.setup().thinness_m, all_known ? reach : 0.25 * reach);
   const double wanted = std::max(std::ceil(far_m / limit), 1.0);
@@ -69,7 +70,7 @@ RigidStep::Plan RigidStep::plan(const ToolPose& p_hat, const ToolPose& q_old, do
   plan.parts = plan.whole ? static_cast<int>(wanted) : kMostParts;
   if (!plan.whole) {
     plan.goal = moved(q_old, difference(p_hat, q_old) * (kMostParts / wanted));
-    // With the goal the way gets shorter only if nothing moves.
+    // The nearer goal shortens the motion only if no object moves.
     if (bodies.moving().empty()) plan.far_m = bodies.motion_m(plan.goal, q_old);
   }
   return plan;
@@ -82,12 +83,13 @@ void RigidStep::allow(const Plan& plan) noexcept {
   allow_for(plan.parts, *state_);
 }
 
-// A step that has used up its looks finds no more in smaller parts, nor without friction.
+// Whether another attempt makes sense. A step among moving objects that has used up its looks would not get further in
+// smaller parts or without friction.
 bool RigidStep::may_look_on() const noexcept {
   return attempt_.looks_left > 0 || !state_->bodies.something_approaches();
 }
 
-// False: no forces were found that keep all laws.
+// Returns false if no forces were found that keep all laws of contact.
 bool RigidStep::take_lawfully(const Way& way) noexcept {
   ToolPose& q = state_->q;
   const bool led = in_parts_.take_outside(way, q);
@@ -96,9 +98,9 @@ bool RigidStep::take_lawfully(const Way& way) noexcept {
   return in_parts_.take_smaller(way, q);
 }
 
-// A tool that stayed where it is would meet the same problem in the next step, so friction is left out of this one. In
-// a hole it stays nevertheless, where a part of the step last kept the law: there a jam is what most often has no
-// solution, and without friction it would slip right through.
+// Takes the step without friction. If the tool stayed at its pose instead, the next step would meet the same problem.
+// With hollow objects the tool stays nevertheless, at the last pose that kept the laws: a step in a hole mostly has no
+// solution because of a jam, and without friction the tool would slip through the jam.
 void RigidStep::take_without_friction(const Way& way) noexcept {
   const RigidBodies& bodies = state_->bodies;
   bool led = false;
@@ -109,7 +111,8 @@ void RigidStep::take_without_friction(const Way& way) noexcept {
     attempt_.without_friction = true;
     const ToolPose reached = state_->q;
     const bool squeezed = attempt_.squeezed;
-    // The iteration may have gone far in a part: in the dent of a mesh past a face that holds only over itself.
+    // In one part, the iteration may have moved far: in a dent of a mesh, for instance, past a face that holds the tool
+    // only if the foot lies on the face.
     led = in_parts_.take(way, state_->q) && !(fallback_.may_be_in() && fallback_.stands_in(state_->q));
     attempt_.without_friction = false;
     if (!led) {

@@ -1,5 +1,5 @@
-// One step of 𝒢 for a rigid tool: in as many parts as it takes, in smaller ones or without friction if that leads
-// nowhere.
+// Takes one step of 𝒢 for a rigid tool, in as many parts as needed. If this fails, it takes smaller parts, and then
+// leaves out friction.
 #pragma once
 
 #include "models/rigid/step_in_parts.hpp"
@@ -14,14 +14,14 @@ class RigidStep {
         fallback_(state, attempt_),
         in_parts_(state, attempt_, iteration_, fallback_) {}
 
-  RigidStep(const RigidStep&) = delete;  // its members refer to each other
+  RigidStep(const RigidStep&) = delete;  // the members refer to each other
   RigidStep& operator=(const RigidStep&) = delete;
 
-  // Writes state.q, the contacts and the flags of the step from q_old.
+  // Takes the step from q_old. Writes the pose, the contacts and the flags to the state.
   void take(const Mat6& K, const ToolPose& p_hat, ToolPose q_old) noexcept;
 
  private:
-  // The part of the way to p̂ that the step takes, in parts. `whole`: all of it.
+  // How the step is taken: its goal and its number of parts. `whole`: the goal is p̂.
   struct Plan {
     ToolPose goal;
     double far_m = 0.0;

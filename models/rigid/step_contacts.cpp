@@ -7,7 +7,7 @@
 namespace proxarm::models {
 namespace {
 
-// A millinewton over a nanometre.
+// The work of a millinewton over a nanometre; less work counts as zero.
 constexpr double kNothing_J = 1e-12;
 
 }  // namespace
@@ -38,15 +38,18 @@ void StepContacts::collect(const RigidBodies& bodies, const Candidates& candidat
   }
 }
 
-// Of second order: the way of a point that turns by θ at a lever bends by θ² lever/2, a normal turns by θ while the
-// point moves on by s, and a round body falls off by s²/2r. An object that moves does honest work: with it only the
-// tool's motion relative to it counts.
+// The tolerance `bends` contains the terms of second order of the work, with the displacement s and the rotation θ:
+// 1. The path of a point at a lever deviates from its tangent by θ² lever/2.
+// 2. The normal turns by θ while the point moves by s.
+// 3. The surface of a round body of radius r deviates from its tangent plane by s²/2r.
+// A moving object may do work on the tool. So with a moving object only the tool's motion relative to the object
+// counts.
 bool StepContacts::give_energy(RigidBodies& bodies, const ToolPose& pose, const ToolPose& q_old) const noexcept {
   if (count_ == 0) return false;
   const View now = view(pose), old = view(q_old);
   double work = 0.0, bends = 0.0;
   const double turned_W = rotation_vector(pose.orientation * q_old.orientation.conjugate()).norm();
-  const double rounding = 2.0 * bodies.rounding_m(pose);  // of a way, between two poses
+  const double rounding = 2.0 * bodies.rounding_m(pose);  // rounding of a displacement between two poses, m
   bodies.measure_slip(pose, q_old);
   for (std::size_t k = 0; k < count_; ++k) {
     const PoseContact& contact = contacts_[k];
@@ -74,7 +77,8 @@ void StepContacts::judge_slips(RigidBodies& bodies, const ToolPose& q_old, ToolP
     for (std::size_t k = 0; k < count_; ++k) contacts_[k].slips = false;
     return;
   }
-  // If more contacts hold than are needed, one may have its force on the cone without slipping.
+  // If more contacts hold the tool than are needed, the force of a contact may lie on the border of the cone although
+  // the contact sticks.
   bodies.measure_slip(q, q_old);
   for (std::size_t k = 0; k < count_; ++k) {
     PoseContact& contact = contacts_[k];

@@ -9,13 +9,14 @@
 namespace proxarm::models {
 namespace {
 
-// Pairs are gathered as far around as this many parts lead.
+// The reach of the pairs, as a multiple of the motion in a part.
 constexpr double kGatheredParts = 8.0;
-// This share of a lower bound of a distance is used at once: a tenth is left for rounding.
+// This share of a lower bound of a distance is used at once; a tenth of the distance is left for rounding.
 constexpr double kOfRoom = 0.9;
-// By how much a batch may grow if the one before was short enough; a batch that was too long is divided by its square.
+// Largest factor by which a batch may be longer than the batch before. A batch that was too long is divided by the
+// square of this factor.
 constexpr int kLonger = 4;
-// A pose with its local problem costs as much as this many pairs.
+// The cost of a pose with its local problem, as a number of evaluated pairs.
 constexpr int kOfPose = 150;
 
 }  // namespace
@@ -27,7 +28,7 @@ bool StepInBatches::take() noexcept {
   state_->touches.count = 0;
   Next next = Next::on;
   while (next != Next::end && next != Next::nowhere) {
-    if (state_->candidates.crowded) {  // a pair that isn't known may be in the way
+    if (state_->candidates.crowded) {  // a pair that wasn't gathered may be in the way
       next = Next::nowhere;
     } else if (attempt_->looks_left < 0) {
       wait_for_objects();
@@ -42,7 +43,7 @@ bool StepInBatches::take() noexcept {
   return next == Next::end;
 }
 
-// The pairs are those that are near where the tool is, the sides those on which it is.
+// Gathers pairs around the reached pose if necessary, and takes the sides there.
 void StepInBatches::begin_batch() noexcept {
   if (state_->gather_if_far(reached_)) {
     attempt_->looks_left -= kOfPose + 4 * static_cast<int>(state_->candidates.triangles_near);
@@ -50,15 +51,15 @@ void StepInBatches::begin_batch() noexcept {
   state_->take_sides(reached_, each_m_);
 }
 
-// As many parts as there is room for. Whether there were any.
+// Moves the tool freely by as many parts as there is room for. Returns whether it did.
 bool StepInBatches::go_freely() noexcept {
   const RigidBodies& bodies = state_->bodies;
   const Candidates& candidates = state_->candidates;
-  // The tool may be off its way, where something held it before.
+  // The tool may be off its path to p̂, because an object held it before.
   const double off = k_ == 0 ? 0.0 : bodies.motion_m(way_.goal(state_->bodies, k_), reached_);
   const int left = way_.parts - k_;
   const double enough = (off + each_m_ * left) / kOfRoom;
-  // If no pair was gathered, nothing is nearer than pairs are gathered.
+  // If no pair was gathered, no object is nearer than the reach of the pairs.
   const bool nothing_near = candidates.count == 0;
   double room = nothing_near ? candidates.gathered_reach_m - candidates.came_m(bodies, reached_) : 0.0;
   if (room < enough) room = std::max(room, free_room_m(*state_, reached_, enough, attempt_->looks_left));
@@ -72,7 +73,7 @@ bool StepInBatches::go_freely() noexcept {
   return true;
 }
 
-// A batch in which something holds the tool, or may.
+// Takes a batch in which an object holds the tool or may hold it.
 StepInBatches::Next StepInBatches::go_held() noexcept {
   const int to = std::min(k_ + batch_, way_.parts);
   const ToolPose start = state_->bodies.carry_to(reached_, way_.share(to));
@@ -86,7 +87,7 @@ StepInBatches::Next StepInBatches::go_held() noexcept {
   const bool solved = iteration_->settle(p, way_.q_old, next);
   attempt_->looks_left -= kOfPose * (before - attempt_->poses_left);
   const double came = state_->sides.came_m(state_->bodies, next);
-  if (batch_ > 1 && !(solved && came <= each_m_)) {  // too far at once
+  if (batch_ > 1 && !(solved && came <= each_m_)) {  // the batch was too long
     attempt_->overflow = false;
     batch_ = std::max(batch_ / (kLonger * kLonger), 1);
     state_->bodies.move_to(way_.share(k_));
@@ -94,11 +95,12 @@ StepInBatches::Next StepInBatches::go_held() noexcept {
   }
   reached_ = solved ? next : start;
   if (solved) {
-    // As many parts at once as the tool needs to come as far as it may in one.
+    // The next batch gets as many parts as the tool, at its present speed, needs for the motion that one part allows.
     const double longer = std::min(kOfRoom * each_m_ / came, double{kLonger}) * batch_;
     batch_ = static_cast<int>(std::clamp(longer, 1.0, static_cast<double>(way_.parts)));
   } else {
-    // As in StepInParts: before the last part any pose will do that leads through nothing.
+    // As in StepInParts, only the forces of the last part are reported. Before it, any pose to which the tool comes
+    // without passing through an object is good enough.
     attempt_->overflow = false;
     if (!fallback_->step_aside(reached_) || to == way_.parts) return Next::nowhere;
   }
@@ -106,8 +108,8 @@ StepInBatches::Next StepInBatches::go_held() noexcept {
   return solved && last ? Next::end : Next::on;
 }
 
-// The budget is used up: the tool stays where it is, or is taken along, until all objects are where they are at the
-// step's end.
+// Called if the budget is used up: moves the objects to their places at the step's end, while the tool stays where it
+// is or is carried along.
 void StepInBatches::wait_for_objects() noexcept {
   RigidBodies& bodies = state_->bodies;
   iteration_->drop_contacts();

@@ -1,9 +1,12 @@
-// A step of many parts among objects that move, taken in batches of parts.
+// Takes a step of many parts among moving objects in batches of parts.
 //
-// Parts are as short as a thin tool or a thin sheet asks for: a step of eight millimetres of a tool of 80 µm has five
-// hundred, of some microseconds each. Most of them add nothing. If nothing is near, the tool goes at once as far as
-// there is room. If something holds it, p̂ goes ahead by many parts at once while the tool hardly moves: a batch is
-// lawful if the tool, seen from all that it may meet, goes no further in it than in a part, however far p̂ goes.
+// 1. A thin tool or a thin sheet requires short parts. For example, a step of eight millimetres with a tool of 80 µm
+//    has five hundred parts, of some microseconds each. Most of them change little, so several parts are taken at
+//    once.
+// 2. If no object is near, the tool moves at once as far as there is room.
+// 3. If an object holds the tool, p̂ moves by many parts at once while the tool hardly moves. Such a batch is correct
+//    if the tool, relative to all objects that it may meet, moves by no more than one part allows. How far p̂ moves
+//    doesn't matter.
 #pragma once
 
 #include "models/rigid/fallback.hpp"
@@ -17,7 +20,7 @@ class StepInBatches {
   StepInBatches(RigidState& state, Attempt& attempt, Iteration& iteration, Fallback& fallback, const Way& way) noexcept
       : state_(&state), attempt_(&attempt), iteration_(&iteration), fallback_(&fallback), way_(way) {}
 
-  // False: some batch led nowhere.
+  // Returns false if some batch had no solution, or if the budget was used up.
   bool take() noexcept;
   [[nodiscard]] const ToolPose& reached() const noexcept { return reached_; }
 
@@ -35,7 +38,7 @@ class StepInBatches {
   Fallback* fallback_;
   Way way_;
   double each_m_ = way_.each_m();
-  int k_ = 0, batch_ = 1;  // parts that are done, and parts of the next batch
+  int k_ = 0, batch_ = 1;  // number of parts that are done; number of parts of the next batch
   ToolPose reached_ = way_.q_old;
 };
 

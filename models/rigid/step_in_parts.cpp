@@ -8,10 +8,10 @@
 namespace proxarm::models {
 namespace {
 
-// A part that finds no forces may be left out if the next one finds some, but not two in a row: sides reach as far as
-// two parts do.
+// Number of consecutive parts without forces that may be left out if the next part finds forces. One, because the sides
+// reach as far as two parts lead.
 constexpr int kMostLeftOut = 1;
-// This many parts are made of one that leads nowhere, or to a solution that gives energy.
+// A part without a solution, or with a solution that gives energy, is divided into this many parts.
 constexpr int kFiner = 8;
 
 }  // namespace
@@ -29,13 +29,14 @@ bool StepInParts::take(const Way& way, ToolPose& q) noexcept {
   return take_parts(way, way.each_m(), {1, way.parts}, q);
 }
 
-// From q, some of the parts, in each of which no point goes further than `each_m`.
+// Takes the parts of `range`, starting from q. In each part no point moves by more than `each_m`. Returns false if some
+// part had no solution.
 bool StepInParts::take_parts(const Way& way, double each_m, const Range& range, ToolPose& q) noexcept {
   const bool approaches = state_->bodies.something_approaches();
-  int left_out = 0;  // parts just before this one
+  int left_out = 0;  // number of parts just before this part that were left out
   state_->take_sides(q, each_m);
   for (int k = range.first; k <= range.last; ++k) {
-    if (state_->candidates.crowded) return false;  // a pair that isn't known may be in the way
+    if (state_->candidates.crowded) return false;  // a pair that wasn't gathered may be in the way
     q = state_->bodies.carry_to(q, way.share(k));
     const ToolPose p = way.goal(state_->bodies, k), from = q;
     if (approaches || (k == way.parts && way.parts > 1)) allow_part(k == way.parts, *state_, *attempt_);
@@ -50,7 +51,8 @@ bool StepInParts::take_parts(const Way& way, double each_m, const Range& range, 
         if (!take_part_closely(way, each_m, k, q)) return false;
       }
     } else {
-      // Only the last part's forces are asked for. Before it, any pose will do that leads through nothing.
+      // Only the forces of the last part are reported. Before it, any pose to which the tool comes without passing
+      // through an object is good enough.
       const bool may = approaches || (k < range.last && left_out++ < kMostLeftOut);
       attempt_->overflow = attempt_->overflow && !may;
       if (!may || !fallback_->step_aside(q) || k == range.last) return false;
@@ -63,7 +65,7 @@ bool StepInParts::take_parts(const Way& way, double each_m, const Range& range, 
   return true;
 }
 
-// One part, in smaller ones.
+// Takes one part, divided into smaller parts.
 bool StepInParts::take_part_closely(const Way& way, double each_m, int part, ToolPose& q) noexcept {
   attempt_->refines = false;
   attempt_->poses_left += kPosesOfPart * kFiner;
@@ -85,16 +87,19 @@ bool StepInParts::take_outside(const Way& way, ToolPose& q) noexcept {
 bool StepInParts::take_smaller(Way way, ToolPose& q) noexcept {
   way.parts *= parts_of_part(way.parts);
   attempt_->poses_left += kPosesOfPart * way.parts;
-  allow_for(2 * way.parts, *state_);  // (of 192 parts along a corner each took 80 contacts)
+  allow_for(2 * way.parts, *state_);  // (measured: 80 contacts for each of 192 parts along a corner)
   state_->bodies.move_to(0.0);
   state_->gather(way.q_old, state_->candidates.gathered_reach_m);
   return take_outside(way, q);
 }
 
-// Over an edge a step gives energy in smaller parts, too. But from so far before a wedge that an eighth of the step
-// leads by it, the iteration may come to a solution beyond, where two vertices meet, say: an eighth that gives energy
-// is divided once more. (Found by the stress study, replay 5459542357847018, step 719.) False: smaller parts lead
-// nowhere or into an object, and the tool stays where they led.
+// Takes a step again, in smaller parts, because its contacts gave energy. Returns false if smaller parts have no
+// solution or lead into an object; the tool then stays at the pose that they reached.
+//
+// A step over an edge gives energy in smaller parts, too, and this is accepted. But if the step starts so far from a
+// wedge that an eighth of the step passes the wedge, the iteration may find a solution on the far side, for instance
+// where two vertices meet. So an eighth that gives energy is divided once more. (Found by the stress study, replay
+// 5459542357847018, step 719.)
 bool StepInParts::take_closely(const Way& way, ToolPose& q) noexcept {
   if (parts_of_part(way.parts) == 1) return true;
   const bool approaches = state_->bodies.something_approaches();

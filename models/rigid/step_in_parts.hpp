@@ -1,8 +1,9 @@
-// A step taken in parts on the way from q(k−1) to p̂.
+// Takes a step in parts on the way from q(k−1) to p̂.
 //
-// Each part starts where the last one ended, and is so short that no feature gets past the reach of the sides; slip
-// counts from q(k−1). A solution in which
-// the contacts did work on the tool is on a side to which it didn't come: then the parts are made smaller.
+// 1. Each part starts at the pose at which the part before ended. A part is so short that no feature gets beyond the
+//    reach of the sides. Slip counts from q(k−1).
+// 2. If the contacts of a solution did work on the tool, the tool has come to a wrong side. The parts are then made
+//    smaller.
 #pragma once
 
 #include "models/rigid/fallback.hpp"
@@ -16,15 +17,16 @@ class StepInParts {
   StepInParts(RigidState& state, Attempt& attempt, Iteration& iteration, Fallback& fallback) noexcept
       : state_(&state), attempt_(&attempt), iteration_(&iteration), fallback_(&fallback) {}
 
-  // From q_old; q is where the parts led. False: some part led nowhere.
+  // Takes the step from q_old, and writes the reached pose to q. Returns false if some part had no solution.
   bool take(const Way& way, ToolPose& q) noexcept;
-  // The same; false also if they led into an object, which q is taken back from.
+  // Does the same. Returns false, too, if the parts led into an object; q is then taken back out of the object.
   bool take_outside(const Way& way, ToolPose& q) noexcept;
-  // The same with each part divided further.
+  // Does the same as take_outside(), with each part divided further.
   bool take_smaller(Way way, ToolPose& q) noexcept;
-  // Takes a step again whose contacts gave energy.
+  // Takes a step again in smaller parts, because its contacts gave energy.
   bool take_closely(const Way& way, ToolPose& q) noexcept;
-  // Into how many smaller parts one is divided. A fast object takes many parts already.
+  // Returns into how many smaller parts a part is divided. The number is smaller with moving objects, because a step
+  // among fast objects has many parts already.
   [[nodiscard]] int parts_of_part(int parts) const noexcept;
   [[nodiscard]] bool gives_energy(const ToolPose& q, const ToolPose& q_old) noexcept;
 

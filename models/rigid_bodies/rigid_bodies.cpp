@@ -93,7 +93,7 @@ void RigidBodies::take_all_as_close() noexcept {
   for (MovingEntry& m : moving_) m.close = true;
 }
 
-// Lower bound of the distance between the tool and an object, wherever the object is now.
+// Returns a lower bound of the distance between the tool and an object at its present place, m.
 double RigidBodies::room_m(std::uint16_t entry, const ToolPose& pose) const noexcept {
   const RigidEntry& e = setup_->entries[entry];
   const Vec3 x = seen_from(entry, view(pose)).x;
@@ -102,8 +102,9 @@ double RigidBodies::room_m(std::uint16_t entry, const ToolPose& pose) const noex
   return room;
 }
 
-// In an object's frame the tool moves by its own motion and the object's. An object that meets the tool pushes it by no
-// more than its own way, and perhaps into the way of others: so the search is repeated until it finds no more.
+// Relative to an object, the tool moves by its own motion and by the object's. An object that meets the tool pushes the
+// tool by at most the object's own motion, but perhaps into the path of other objects. So the search is repeated until
+// it finds no further object.
 double RigidBodies::begin_step(const ToolPose& p_hat, const ToolPose& q) noexcept {
   move_to(0.0);
   const double far = motion_m(p_hat, q);
@@ -129,7 +130,7 @@ double RigidBodies::begin_step(const ToolPose& p_hat, const ToolPose& q) noexcep
   return motion_m(mover.is().back(p_hat), mover.at().back(q));
 }
 
-// The moving object that is all that is near.
+// Returns the index in moving_ of the moving object near the tool, if no other object is near; else nullopt.
 std::optional<std::size_t> RigidBodies::only_one_near(const ToolPose& q, double near) const noexcept {
   std::optional<std::size_t> found;
   for (std::size_t i = 0; i < moving_.size(); ++i) {
@@ -180,8 +181,8 @@ void RigidBodies::measure_slip(const ToolPose& pose, const ToolPose& q_old) noex
   }
 }
 
-// The slip is computed from the tool's motion, not from the point's places: it is then rounded as a rigid motion is,
-// which contacts that stick together don't contradict.
+// The slip is computed from the tool's motion instead of from the places of the point. The rounded slips of several
+// points then still belong to one rigid motion, so several contacts can stick at once.
 //   slip = Δx + (1 − exp(−θ)) lever
 Vec3 RigidBodies::slip_m(std::uint16_t entry, const Vec3& lever) const noexcept {
   const MovingEntry& m = moving(entry);

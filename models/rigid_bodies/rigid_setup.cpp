@@ -13,10 +13,11 @@
 namespace proxarm::models {
 namespace {
 
-// More pairs of corners than a box has among twenty others: if most of them came near, a step would look at too many.
+// The number of pairs of corners between a box and twenty other boxes. If there are more pairs and most of them came
+// near, a step would have to look at too many.
 constexpr std::size_t kManyCorners = 1280;
 
-// The least extent of a solid; features on its far side are that far away.
+// Returns the smallest extent of a solid, m. Features on opposite sides of the solid are at least this far apart.
 double thickness(const Solid& solid) {
   double least = std::numeric_limits<double>::infinity();
   if (solid.radius > 0.0) return solid.radius;
@@ -61,7 +62,7 @@ void require_few_edges(const Solid& solid) {
   if (solid.edges.size() > NearFaces::most_edges) throw std::invalid_argument("a hull of more than 2000 points");
 }
 
-// Whether both have edges that may meet, one of them round.
+// Whether a part and an object both have edges, and at least one of the two bodies is round.
 bool meet_along_edges(const Solid& part, const RigidEntry& entry) {
   const Solid* solid = entry.solid();
   const bool has_edges = solid != nullptr ? !solid->edges.empty() : entry.mesh() != nullptr;
@@ -69,7 +70,7 @@ bool meet_along_edges(const Solid& part, const RigidEntry& entry) {
   return part.radius > 0.0 || (solid != nullptr && solid->radius > 0.0);
 }
 
-// Refuses objects that a cylinder of the tool has no contact with.
+// Throws if the object is of a kind that can't hold a cylinder of the tool.
 void require_contact_with_cylinder(const RigidEntry& entry) {
   const auto* tube = std::get_if<HollowTube>(&entry.object.shape);
   if (tube != nullptr && !tube->endless) {

@@ -1,4 +1,4 @@
-// What is constant in a rigid world: the parts of the tool and the objects, with their bounds.
+// Holds the constant data of a rigid world: the parts of the tool and the objects, with their bounds.
 #pragma once
 
 #include <cstddef>
@@ -17,24 +17,24 @@ namespace proxarm::models {
 
 // A part of the tool, in T.
 struct RigidPart {
-  Solid solid;  // a mesh's vertices, edges and faces stand here as well
-  Bounds box;   // of the solid's points
+  Solid solid;  // for a mesh: also its vertices, edges and faces
+  Bounds box;   // box around the solid's points
   std::optional<double> friction;
   std::shared_ptr<const TriangleFeatures> mesh{};
   std::optional<Cylinder> cylinder{};
-  NodeDiscs discs{};  // of a mesh, if an object is a mesh, too
+  NodeDiscs discs{};  // for a mesh, if an object is a mesh, too; else empty
 };
 
 // An object, in its frame.
 struct RigidEntry {
   RigidObject object;
-  Bounds bounds;      // of the whole object; infinite if it is flat or hollow
-  Bounds box{};       // of a solid's points, or of a mesh
-  double held = 0.0;  // of a closed mesh: 1 or −1, the side of its faces on which the tool is
+  Bounds bounds;      // box around the whole object; infinite if the object is flat or hollow
+  Bounds box{};       // box around the points of a solid, or around a mesh
+  double held = 0.0;  // for a closed mesh: the side of its faces on which the tool is, 1 or −1
   std::optional<Cylinder> cylinder{};
-  NodeDiscs discs{};  // of a mesh, if a part of the tool is a mesh, too
+  NodeDiscs discs{};  // for a mesh, if a part of the tool is a mesh, too; else empty
 
-  // Null if the object has another shape.
+  // Return null if the object has another shape.
   [[nodiscard]] const Solid* solid() const noexcept { return std::get_if<Solid>(&object.shape); }
   [[nodiscard]] const TriangleFeatures* mesh() const noexcept {
     const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
@@ -42,21 +42,22 @@ struct RigidEntry {
   }
 };
 
-// Precondition: it is a mesh, and the setup has meshes on both sides.
+// Precondition: the part or the entry is a mesh, and both the tool and the objects of the setup have meshes.
 inline FlatMesh flat_mesh(const RigidPart& part) noexcept { return {part.mesh->mesh(), part.discs}; }
 inline FlatMesh flat_mesh(const RigidEntry& entry) noexcept { return {entry.mesh()->mesh(), entry.discs}; }
 
 struct RigidSetup {
   std::vector<RigidPart> parts;
-  std::vector<RigidEntry> entries;  // first those that stand still
-  std::size_t first_moving = 0;     // index of the first entry that moves
+  std::vector<RigidEntry> entries;  // first the objects that can't move
+  std::size_t first_moving = 0;     // index of the first entry that can move
   double reach_m = 0.0;             // largest distance of a point of the tool from the reference point
-  double thinness_m = std::numeric_limits<double>::infinity();  // least thickness of all parts and solid objects
+  double thinness_m = std::numeric_limits<double>::infinity();  // thickness of the thinnest part or solid object, m
   bool hollow = false;                                          // an object is a hollow sphere or tube
-  bool bends = false;       // an object is hollow or a body has a rim: the gaps' curvature counts
-  bool edges_bend = false;  // a round edge may meet another edge: the curvature counts where they nearly align
-  bool dense = false;       // there is a mesh, or solids have many corners: much may be near
-  bool mesh_tool = false, mesh_objects = false;
+  bool bends = false;  // an object is hollow or a body has a rim, so the gaps' curvature counts
+  // a round edge may meet another edge, so the curvature counts if the edges are nearly parallel
+  bool edges_bend = false;
+  bool dense = false;  // there is a mesh, or solids have many corners, so many features may be near
+  bool mesh_tool = false, mesh_objects = false;  // a part of the tool is a mesh; an object is a mesh
 };
 
 // Throws std::invalid_argument as RigidWorld's constructor states.

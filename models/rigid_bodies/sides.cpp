@@ -8,9 +8,11 @@ namespace {
 
 bool is_behind_reach(double height, double far) noexcept { return height < -2.0 * far - kFront_m; }
 
-// A point of an object over a face of the tool. 1: the point is in front of the face, or behind it with its foot beside
-// the face, as beyond an edge. 0: it is too far behind, or its foot is on the face: then it came from the body's far
-// side, which is near next to an edge, however thick the body is.
+// Returns the side for a point of an object and a face of the tool:
+// 1: The point is in front of the face. Or it is behind the face and its foot lies beside the face, for instance beyond
+// an edge.
+// 0: The point is too far behind the face. Or it is behind the face and its foot lies on the face; the point then came
+// from the body's far side. (Next to an edge the far side is near, however thick the body is.)
 double side_of_tools_face(const RigidBodies& bodies, const Pair& pair, const View& at, double height,
                           double far) noexcept {
   if (height >= -kFront_m) return 1.0;
@@ -21,7 +23,7 @@ double side_of_tools_face(const RigidBodies& bodies, const Pair& pair, const Vie
   return touch_face(y, 0.0, face.normal, face.offset, own.points, own.corners(face), 1.0).has_value() ? 0.0 : 1.0;
 }
 
-// The same for a point of the tool under a face of a solid.
+// Returns the same for a point of the tool and a face of a solid object.
 double side_of_solids_face(const RigidBodies& bodies, const Pair& pair, const View& at, double height,
                            double far) noexcept {
   if (height >= -kFront_m) return 1.0;
@@ -32,7 +34,8 @@ double side_of_solids_face(const RigidBodies& bodies, const Pair& pair, const Vi
   return touch_face(p, 0.0, face.normal, face.offset, solid.points, solid.corners(face), 1.0).has_value() ? 0.0 : 1.0;
 }
 
-// A closed mesh holds the tool on one side, an open mesh on the side on which the feature is.
+// Returns the side for a mesh; 0 if the pair isn't judged. A closed mesh holds the tool on one fixed side. An open mesh
+// holds the tool on the side on which the tool's feature is.
 double side_of_mesh(const RigidBodies& bodies, const Pair& pair, const View& at, double height, double far) noexcept {
   const TriangleFeatures& mesh = *bodies.entry(pair).mesh();
   const double held = bodies.entry(pair).held;
@@ -97,7 +100,7 @@ void Sides::take(RigidBodies& bodies, std::span<Pair> pairs, const ToolPose& q, 
     const View& at = bodies.moves(pair.entry) ? bodies.moving(pair.entry).from : at_W;
     const bool is_mesh = bodies.entry(pair).mesh() != nullptr;
     const double height = signed_height_m(bodies, pair, at);
-    // A pair that pressed keeps its side, unless it lost that in a part that found no solution.
+    // A pair that pressed keeps its side, unless the side became 0 in a part of the step without a solution.
     const bool near = pair.pressed && pair.side != 0.0F && std::abs(height) < kFront_m;
     if (pair.kind == PairKind::face_point) {
       if (!near) pair.side = static_cast<float>(side_of_tools_face(bodies, pair, at, height, far_m));

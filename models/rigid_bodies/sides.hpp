@@ -1,7 +1,7 @@
-// On which side of each feature the tool was where a step, or a part of it, began.
+// Records on which side of each feature the tool was at the beginning of a step or of a part of a step.
 //
-// A face or an edge holds the tool on the side on which it was at q(k−1). A side says nothing about a pose further away
-// than it reaches.
+// A face or an edge holds the tool on the side on which the tool was at that beginning. The recorded sides are valid
+// only for poses within reach_m().
 #pragma once
 
 #include <span>
@@ -10,24 +10,27 @@
 
 namespace proxarm::models {
 
-// Signed distance of a pair of point and face or of two edges, m, with the tool at a view in the object's frame: the
-// height of the tool's feature over the object's, or of the object's point over the tool's face.
+// Returns the signed distance of a pair, m. The pair consists of a point and a face, or of two edges; `at` is the
+// tool's pose in the object's frame. The result is the height of the tool's feature over the object's feature, or of
+// the object's point over the tool's face.
 [[nodiscard]] double signed_height_m(const RigidBodies& bodies, const Pair& pair, const View& at) noexcept;
 
 class Sides {
  public:
-  // Writes each pair's side at q. The tool goes on by at most `far_m` in the part of the step that begins.
+  // Writes the side of each pair, with the tool at q. Precondition: in the part of the step that now begins, no point
+  // of the tool moves by more than `far_m`.
   void take(RigidBodies& bodies, std::span<Pair> pairs, const ToolPose& q, double far_m) noexcept;
 
   [[nodiscard]] const ToolPose& from() const noexcept { return from_; }
-  // The tool where the sides were taken, in the frame of the pair's object.
+  // Returns the tool's pose at which the sides were taken, in the frame of the pair's object.
   [[nodiscard]] View tool_at_start(const RigidBodies& bodies, const Pair& pair) const noexcept;
-  // How far behind a feature the tool may be and still be held by it, m.
+  // Returns how far behind a feature the tool may be so that the feature still holds the tool, m.
   [[nodiscard]] double reach_m() const noexcept { return reach_m_; }
-  // How far the tool has come since, relative to what it may meet, m.
+  // Returns how far the tool has moved since the sides were taken, relative to the objects that it may meet, m.
   [[nodiscard]] double came_m(const RigidBodies& bodies, const ToolPose& pose) const noexcept;
-  // Whether a tool's point that is now at p, on the other side of a mesh's face than before, went through that face:
-  // its way meets the plane on the triangle. Otherwise it came around.
+  // Whether the pair's point of the tool, which is now at p, went through the pair's face of a mesh. If the point
+  // changed sides, this means that the point's path meets the plane inside the triangle; otherwise the point came
+  // around the triangle. True if the point didn't change sides or if the pair pressed.
   [[nodiscard]] bool went_through(const RigidBodies& bodies, const Pair& pair, const Vec3& p) const noexcept;
 
  private:

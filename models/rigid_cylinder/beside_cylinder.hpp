@@ -1,5 +1,5 @@
-// The features of the body beside a cylinder, in that body's frame: a convex solid, or a mesh of which one side is
-// touched.
+// Gives the features of the body that a cylinder touches, in this body's frame. The body is a convex solid, or a mesh
+// that is touched on one side.
 #pragma once
 
 #include <algorithm>
@@ -20,16 +20,16 @@ class BesideCylinder {
     double offset = 0.0;
     std::span<const Vec3> points;
     std::span<const std::uint32_t> ring;
-    double side = 1.0;  // −1: the ring runs clockwise, seen from where the normal points
+    double side = 1.0;  // −1: the ring runs clockwise, as seen from where the normal points
 
-    // Whether the point's foot lies on the face.
+    // Whether the foot of p lies on the face.
     [[nodiscard]] bool over(const Vec3& p, double beside = beside_m) const noexcept {
       return touch_face(p, 0.0, side * normal, 0.0, points, ring, 1.0, beside).has_value();
     }
   };
 
   explicit BesideCylinder(const Solid& solid) noexcept : solid_(&solid), radius_(solid.radius) {}
-  // `held` is 1 or −1, the side of its faces that is touched.
+  // `held`: the side of the mesh's faces that is touched, 1 or −1.
   BesideCylinder(const TriangleFeatures& mesh, double held) noexcept : mesh_(&mesh), held_(held) {}
 
   [[nodiscard]] const Solid* solid() const noexcept { return solid_; }
@@ -54,11 +54,12 @@ class BesideCylinder {
     return {normal, normal.dot(face_of(*mesh_, i).corner), mesh_->mesh().structure().vertices,
             mesh_->mesh().triangle(i), held_};
   }
-  // False: a valley of a mesh, which no sharp feature touches.
+  // Returns false for a valley of a mesh; no sharp feature can touch a valley.
   [[nodiscard]] bool sticks_out(std::uint32_t edge) const noexcept {
     return mesh_ == nullptr || mesh_->edge(edge).ridge == (held_ > 0.0);
   }
-  // Greatest height of the lowest place of a rim over all faces but one, m. Precondition: a solid.
+  // Returns the largest height of a rim's lowest place over the solid's faces, with one face left out, m. Precondition:
+  // the body is a solid.
   [[nodiscard]] double highest_over_others(const Solid::Rim& rim, std::uint32_t face) const noexcept {
     double most = -std::numeric_limits<double>::infinity();
     for (std::uint32_t i = 0; i < solid_->faces.size(); ++i) {
@@ -76,7 +77,7 @@ class BesideCylinder {
   double held_ = 1.0, radius_ = 0.0;
 };
 
-// The body beside the cylinder, if one of the two is a cylinder.
+// Returns the body beside the cylinder. Precondition: the part or the object is a cylinder.
 inline BesideCylinder beside_cylinder(const RigidPart& part, const RigidEntry& entry) noexcept {
   if (!part.cylinder) return part.mesh ? BesideCylinder(*part.mesh, 1.0) : BesideCylinder(part.solid);
   const TriangleFeatures* mesh = entry.mesh();

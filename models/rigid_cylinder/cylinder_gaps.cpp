@@ -23,7 +23,7 @@ int meet_face(const Pair& pair, const Solid::Rim& rim, const BesideCylinder::Fac
 
 }  // namespace
 
-// A cylinder and the body beside it at a pose of the tool, in the body's frame.
+// A cylinder and the body beside the cylinder, at a pose of the tool, in the body's frame.
 struct CylinderGaps::AtCylinder {
   AtCylinder(const RigidBodies& bodies, const Pair& pair, const View& tool, const Cylinder& seen) noexcept
       : ours(bodies.part(pair).cylinder.has_value()),
@@ -33,18 +33,18 @@ struct CylinderGaps::AtCylinder {
         at(tool),
         cylinder(seen) {}
 
-  // In the object's frame.
+  // Returns a meeting as a touch in the object's frame.
   [[nodiscard]] Touch touch(const Meeting& meeting) const noexcept {
     if (ours) return {meeting.on_cylinder, -meeting.out, meeting.gap};
     return {at * meeting.on_other, at.R * meeting.out, meeting.gap};
   }
-  // The place of the cylinder's material with the tool at another view.
+  // Returns the position of the cylinder's material point `place` for another pose of the tool, in the body's frame.
   [[nodiscard]] Vec3 elsewhere(const Vec3& place, const View& other) const noexcept {
     return ours ? other * at.to_T(place) : other.to_T(at * place);
   }
 
-  bool ours;                     // the cylinder is the tool's
-  std::uint32_t round, feature;  // of the cylinder and of the body
+  bool ours;                     // the cylinder is a part of the tool
+  std::uint32_t round, feature;  // index of the cylinder's rim or end; index of the body's corner, edge or face
   BesideCylinder body;
   View at;
   Cylinder cylinder;
@@ -76,13 +76,14 @@ int CylinderGaps::meet(const Pair& pair, const AtCylinder& here, double beside, 
   }
 }
 
-// A meeting counts if its foot lies on the face, and if it isn't less deep under another surface of the cylinder, which
-// then holds it: a corner that lies on an end is behind the side as well.
+// A meeting counts if its foot lies on the face, and if no other surface of the cylinder holds the place instead.
+// Another surface holds the place if the place is less deep under that surface. For instance, a corner that lies on an
+// end is also behind the cylinder's side.
 bool CylinderGaps::counts(const Pair& pair, const AtCylinder& here, double beside,
                           const Meeting& meeting) const noexcept {
   if (pair.kind == PairKind::rim_face && !here.body.face(here.feature).over(meeting.on_cylinder, beside)) return false;
   if (!(meeting.gap < -kGap_m)) return true;
-  // A centre outside of the cylinder has one nearest feature.
+  // The centre of a round feature is outside of the cylinder, so the cylinder has one nearest feature.
   if (here.body.radius() > 0.0) return true;
   const Cylinder& cylinder = here.cylinder;
   const auto before = [&](std::uint32_t end) { return cylinder.before_end(end, meeting.on_other); };
@@ -105,8 +106,8 @@ bool CylinderGaps::counts(const Pair& pair, const AtCylinder& here, double besid
   }
 }
 
-// Whether a place of a rim was behind a mesh's face at the beginning without having gone through it: further behind
-// than the sides reach, or with its foot on the face.
+// Whether a place of a rim was behind a mesh's face at the beginning of the part of the step without having gone
+// through the face: the place was further behind than the sides reach, or its foot lay on the face.
 bool CylinderGaps::was_behind_face(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept {
   const Vec3 was = here.elsewhere(place, sides_->tool_at_start(*bodies_, pair));
   const BesideCylinder::Face face = here.body.face(here.feature);
@@ -115,15 +116,16 @@ bool CylinderGaps::was_behind_face(const Pair& pair, const AtCylinder& here, con
   return height < -sides_->reach_m() || face.over(was);
 }
 
-// Whether a place of a rim that was behind a solid's face at the beginning is outside of the solid, before another one
-// of its faces: it came around an edge.
+// Whether a place of a rim came around an edge of a solid: at the beginning of the part of the step the place was
+// behind the face, and now it is outside of the solid, in front of another face.
 bool CylinderGaps::came_around(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept {
   const BesideCylinder::Face face = here.body.face(here.feature);
   return face.normal.dot(here.elsewhere(place, sides_->tool_at_start(*bodies_, pair))) - face.offset < -kFront_m &&
          is_outside(*here.body.solid(), place);
 }
 
-// Whether the edge was far behind the rim at the beginning, as an edge on the body's other side is.
+// Whether the edge was far behind the rim at the beginning of the part of the step, like an edge on the body's far
+// side.
 bool CylinderGaps::was_behind_edge(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept {
   const Solid::Rim& rim = here.cylinder.rims[here.round];
   const Vec2 in_rim((place - rim.centre).dot(rim.u), (place - rim.centre).dot(rim.v));
@@ -131,7 +133,7 @@ bool CylinderGaps::was_behind_edge(const Pair& pair, const AtCylinder& here, con
   return height_of_rim(was, here.round, here.body.edge(here.feature), in_rim) < -sides_->reach_m();
 }
 
-// The cylinder, in the frame of the body beside it.
+// Returns the cylinder in the frame of the body beside the cylinder.
 Cylinder CylinderGaps::seen_from_body(const Pair& pair, const View& at) const noexcept {
   const std::optional<Cylinder>& own = bodies_->part(pair).cylinder;
   if (own) return moved(*own, at.R, at.x);

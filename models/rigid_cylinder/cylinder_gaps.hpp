@@ -1,6 +1,7 @@
-// How near a feature of a cylinder is to a feature of another body, or of another cylinder.
+// Computes the gaps between a feature of a cylinder and a feature of another body or of another cylinder.
 //
-// A cylinder and another body are seen from that body, whether the cylinder is the tool's part or the object.
+// A cylinder and another body are compared in the frame of the other body, whether the cylinder is a part of the tool
+// or the object.
 #pragma once
 
 #include <array>
@@ -18,11 +19,12 @@ class CylinderGaps {
 
   CylinderGaps(const RigidBodies& bodies, const Sides& sides) noexcept : bodies_(&bodies), sides_(&sides) {}
 
-  // The places where the two may touch, in the object's frame, with the tool at `at` in that frame. The gap is infinite
-  // at a place that doesn't count. `beside`: how far beside a face or an edge's end a foot may lie. Returns their
-  // number. A call for the same part and entry as the last one must have the same `at`.
+  // Writes the places where a pair's features may touch, in the object's frame, and returns their number. The gap is
+  // infinite at a place that doesn't count. `at` is the tool's pose in the object's frame. `beside`: how far beside a
+  // face or an edge's end a foot may lie, m. Precondition: consecutive calls for the same part and entry have the same
+  // `at`.
   [[nodiscard]] int touch(const Pair& pair, const View& at, double beside, Places& out) noexcept;
-  // The rim of a pair, and the flat side under it.
+  // Returns the flat side under the rim of a pair, and writes the rim; both are in one frame.
   [[nodiscard]] FlatSide side_under_rim(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept;
 
  private:
@@ -46,7 +48,8 @@ class CylinderGaps {
 
   const RigidBodies* bodies_;
   const Sides* sides_;
-  // Many pairs of one part and entry follow each other: their cylinder is kept.
+  // The cylinder of the last pair, in the body's frame. It is kept because many consecutive pairs have the same part
+  // and entry.
   bool known_ = false;
   std::uint16_t part_ = 0, entry_ = 0;
   Cylinder cylinder_;

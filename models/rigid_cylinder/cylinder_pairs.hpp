@@ -1,4 +1,4 @@
-// Which features of a cylinder may meet those of another body, or of another cylinder.
+// Finds the pairs of features that may meet: of a cylinder and another body, or of two cylinders.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace proxarm::models {
 
-// A cylinder beside another body, in the body's frame. `add` takes the kind of a pair, the cylinder's feature and the
-// body's, for each two that come within `reach` of each other.
+// Finds the pairs of a cylinder and another body, in the body's frame. It calls add(kind, cylinder's feature, body's
+// feature) for all features within `reach` of each other (m), and for some others.
 template <typename Add>
 class CylinderPairs {
  public:
@@ -69,7 +69,8 @@ class CylinderPairs {
   Add add_;
 };
 
-// Whether a rim comes within `near` of the plane of another cylinder's end, and its middle near enough to the end's.
+// Whether a rim may come within `near` of an end of another cylinder: tests the heights of the rim's points over the
+// plane of the end, and the distance of the two centres across the other cylinder's axis.
 inline bool comes_near_end(const Solid::Rim& rim, const Cylinder& other, std::uint32_t end, double near) noexcept {
   const double height = other.before_end(end, rim.centre);
   const double down = rim.radius * std::hypot(other.axis.dot(rim.u), other.axis.dot(rim.v));
@@ -77,7 +78,8 @@ inline bool comes_near_end(const Solid::Rim& rim, const Cylinder& other, std::ui
   return std::abs(height) <= near + down && across.norm() <= rim.radius + other.radius + near;
 }
 
-// Two cylinders in one frame: calls add(kind, own feature, other feature).
+// Calls add(kind, own feature, other feature) for the features of two cylinders that may be within `reach` of each
+// other. Both cylinders are in one frame.
 template <typename Add>
 void each_pair_of_cylinders(const Cylinder& own, const Cylinder& other, double reach, Add add) noexcept {
   const EdgeLine own_axis = axis_of(own), other_axis = axis_of(other);

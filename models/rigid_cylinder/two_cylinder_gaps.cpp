@@ -1,4 +1,4 @@
-// Two cylinders: a part of the tool and an object, in the object's frame.
+// Computes the gaps between two cylinders, a part of the tool and an object, in the object's frame.
 #include <algorithm>
 #include <limits>
 
@@ -15,7 +15,7 @@ struct CylinderGaps::TwoCylinders {
   Cylinder own, other;
 };
 
-// The normals of the meetings point out of the object; on_other is a place of the tool.
+// In all meetings `out` points out of the object, and on_other is a place on the tool.
 int CylinderGaps::meet(const Pair& pair, const TwoCylinders& here, double beside, Meetings& out) noexcept {
   const Vec2 level(pair.level[0], pair.level[1]);
   int count = 0;
@@ -45,7 +45,7 @@ int CylinderGaps::meet(const Pair& pair, const TwoCylinders& here, double beside
   return count;
 }
 
-// As for a cylinder and a solid: a meeting counts that isn't less deep under another surface.
+// A meeting counts if the place isn't less deep under another surface, which would then hold the place instead.
 bool CylinderGaps::counts(const Pair& pair, const TwoCylinders& here, const Meeting& meeting) const noexcept {
   if (!(meeting.gap < -kGap_m)) return true;
   const auto under_ends = [&](const Cylinder& cylinder, const Vec3& x) {

@@ -18,8 +18,8 @@ double to_wrong_side_m(const TriangleMesh& mesh, const Vec3& x, std::optional<bo
   return -mesh.distance(x, std::numeric_limits<double>::infinity(), near);
 }
 
-// Planes that may lie between a solid and triangles: how far the solid reaches along some normals. What is apart from
-// one triangle is mostly so from those next to it by the same plane.
+// Planes that may separate a solid from triangles. For each normal it stores how far the solid reaches along it. A
+// plane that separates the solid from one triangle mostly separates it from the neighbouring triangles, too.
 class Planes {
  public:
   Planes(const Solid& solid, const View& at, const Apart& apart) noexcept : solid_(&solid), at_(at) {
@@ -29,9 +29,9 @@ class Planes {
     if (apart.last == nullptr) return;
     for (std::size_t i = 0; i < apart.last->count; ++i) add(apart.last->normals[i]);
   }
-  // The oldest goes where there is no room.
+  // Adds a plane; if there is no room, it replaces the oldest plane.
   void add(const Vec3& normal) noexcept { planes_[added_++ % kMost] = {normal, 0.0, false, false}; }
-  // Whether a triangle is by more than `gap` beyond one of them.
+  // Whether all corners of a triangle lie more than `gap` beyond one of the planes.
   [[nodiscard]] bool leave(double gap, const std::array<Vec3, 3>& triangle) noexcept {
     if (last_ < added_ && leaves(planes_[last_], gap, triangle)) return true;
     for (std::size_t i = 0; i < std::min(added_, kMost); ++i) {
@@ -41,7 +41,7 @@ class Planes {
     }
     return false;
   }
-  // Those that weren't given and that left a triangle.
+  // Writes the normals of the planes that separated a triangle; planes that the caller gave are left out.
   void keep(PlanesBetween& out) const noexcept {
     out.count = 0;
     for (std::size_t i = given_; i < std::min(added_, kMost) && out.count < out.normals.size(); ++i) {
@@ -53,7 +53,7 @@ class Planes {
   static constexpr std::size_t kMost = 24, kGiven = 12;
   struct Plane {
     Vec3 normal;
-    double reach = 0.0;  // of the solid, along it
+    double reach = 0.0;  // how far the solid reaches along the normal, m
     bool measured = false, of_use = false;
   };
   [[nodiscard]] bool leaves(Plane& plane, double gap, const std::array<Vec3, 3>& triangle) const noexcept {
@@ -74,7 +74,9 @@ class Planes {
   const Solid* solid_;
   View at_;
   std::array<Plane, kMost> planes_;
-  std::size_t added_ = 0, given_ = 0, last_ = 0;  // the one that left a triangle last
+  // Number of planes that were added; number of planes that the caller gave; index in planes_ of the plane that
+  // separated a triangle last.
+  std::size_t added_ = 0, given_ = 0, last_ = 0;
 };
 
 }  // namespace

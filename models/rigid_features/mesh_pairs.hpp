@@ -1,4 +1,4 @@
-// Which triangles of two meshes come near each other.
+// Finds the triangles of two meshes that come near each other.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,8 @@
 
 namespace proxarm::models {
 
-// Goes down both trees at once. `at` leads from the frame of the first mesh to that of the second.
+// Searches the trees of both meshes together. `at` transforms from the frame of the first mesh, `own`, into the frame
+// of the second mesh, `other`. `near`: the distance up to which triangles count as near, m.
 class MeshPairs {
  public:
   MeshPairs(const FlatMesh& own, const FlatMesh& other, const View& at, double near) noexcept
@@ -21,22 +22,25 @@ class MeshPairs {
         at_(at),
         near_(near) {}
 
-  // Leaves of both trees.
+  // A leaf of the first tree and a leaf of the second tree.
   struct Leaves {
-    std::uint32_t own = 0, other = 0;  // twice the index of the pair of nodes, and which one it is
+    std::uint32_t own = 0, other = 0;  // twice the index of a pair of nodes, plus 0 or 1 for the node in the pair
   };
 
-  // Calls visit(own face, other face) for each two that come so near, and some that don't, until it returns false.
+  // Calls visit(own face, other face) for all pairs of faces within `near` of each other, and for some others, until
+  // visit returns false.
   template <typename Visit>
   void each(Visit visit) noexcept {
     each_leaves([&](const Node& own, const Node& other) { return look_at(own, other, visit); });
   }
-  // Calls visit(Leaves) for each two leaves that may hold such, until it returns false.
+  // Calls visit(Leaves) for all pairs of leaves that may contain faces within `near` of each other, until visit returns
+  // false.
   template <typename Visit>
   void list(Visit visit) const noexcept {
     each_leaves([&](const Node& own, const Node& other) { return visit(Leaves{own.index, other.index}); });
   }
-  // As each(), of those that are listed: with the same meshes, and not nearer than all that is to be known.
+  // Does the same as each(), but only for leaves from a list that list() made. Precondition: the list belongs to the
+  // same meshes and contains all leaves that are within `near` of each other at this pose.
   template <typename List, typename Visit>
   void each_of(const List& list, Visit visit) noexcept {
     Node own;
@@ -52,8 +56,10 @@ class MeshPairs {
   }
 
  private:
-  static constexpr std::size_t kAhead = 6;  // most of a large mesh's leaves are in no cache
-  // A node of a tree, as of TriangleMesh::NodePair, and its disc in the other mesh's frame.
+  // Prefetch distance in list items; most leaves of a large mesh aren't in a cache
+  static constexpr std::size_t kAhead = 6;
+  // A node of a tree, with `first` and `count` as in TriangleMesh::NodePair. The disc is in the frame of the second
+  // mesh.
   struct Node {
     NodeDisc disc;
     std::uint32_t index = 0, first = 0, count = 0;
@@ -64,10 +70,11 @@ class MeshPairs {
 
   template <typename Visit>
   void each_leaves(Visit visit) const noexcept {
-    // Each of two trees halves its faces at each level, and a node that is divided leaves one of its halves to wait.
+    // Each level of a tree halves the number of faces, so a tree has at most 64 levels. Each division of a node leaves
+    // one half on the stack.
     std::array<NodesOfBoth, 130> stack;
     std::size_t top = 0;
-    push_near(stack, top, own_node(0), other_node(0));  // (the root is alone in its pair)
+    push_near(stack, top, own_node(0), other_node(0));  // the root is the only node in its pair
     while (top > 0) {
       const NodesOfBoth next = stack[--top];
       if (next.own.count > 0 && next.other.count > 0) {
@@ -100,12 +107,13 @@ class MeshPairs {
     if (!apart(own.disc, other.disc, near_)) stack[top++] = {own, other};
   }
 
-  // In the other frame.
+  // A triangle in the frame of the second mesh, with the box around it.
   struct Triangle {
     std::array<Vec3, 3> corners;
     Vec3 low, high, normal;
   };
-  // The same triangles are asked for again and again, against others.
+  // Caches triangles: each triangle is needed several times in a row, together with different triangles of the other
+  // mesh.
   class Kept {
    public:
     Kept() noexcept { face_of_.fill(0xFFFFFFFF); }  // no face
@@ -140,7 +148,7 @@ class MeshPairs {
   [[nodiscard]] bool boxes_apart(const Triangle& own, const Vec3& low, const Vec3& high) const noexcept {
     return ((own.low - high).array() > near_).any() || ((low - own.high).array() > near_).any();
   }
-  // By their boxes and their planes.
+  // Whether two triangles may be within `near` of each other. It tests their boxes and planes.
   [[nodiscard]] bool come_near(const Triangle& own, const Triangle& other) const noexcept {
     if (boxes_apart(own, other.low, other.high)) return false;
     return !on_one_side(other.normal, other.corners[0], own.corners) &&
@@ -163,7 +171,7 @@ class MeshPairs {
     return true;
   }
 
-  // Whether a triangle is further from a plane than it may be.
+  // Whether a triangle lies more than `near` above a plane, or more than `near` below it.
   [[nodiscard]] bool on_one_side(const Vec3& normal, const Vec3& through,
                                  const std::array<Vec3, 3>& triangle) const noexcept {
     const Vec3 heights(normal.dot(triangle[0] - through), normal.dot(triangle[1] - through),

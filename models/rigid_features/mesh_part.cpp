@@ -34,8 +34,8 @@ Solid solid_of(const TriangleFeatures& features) {
   return solid;
 }
 
-// From a place on a face into the body, as far as where it ends in a face that looks the other way. Where it ends in
-// another one, the place is beside a ridge, and that is no wall.
+// Returns the distance from a place on a face, straight through the body, to the opposite face. If that face doesn't
+// look the other way, the place is beside a ridge; this isn't a wall, and the result is the diagonal of the mesh's box.
 double thickness_at(const TriangleMesh& mesh, std::uint32_t face, const Vec3& place) {
   constexpr double most_cosine = -0.5;
   const Vec3 normal = mesh.face(face).normal, inside = place - 16.0 * mesh.lift_m() * normal;
@@ -45,7 +45,8 @@ double thickness_at(const TriangleMesh& mesh, std::uint32_t face, const Vec3& pl
   return is_wall ? hit.share * far : far;
 }
 
-// Of a face it is the most at four of its places: a wall that ends in a sharp edge is as thick as beside that.
+// Returns the thickness of the thinnest wall. The thickness at a face is the largest thickness at four of the face's
+// places. So a wall that ends in a sharp edge counts with its thickness beside the edge.
 double thickness(const TriangleMesh& mesh) {
   double least = std::numeric_limits<double>::infinity();
   for (std::uint32_t f = 0; f < mesh.size(); ++f) {

@@ -1,4 +1,4 @@
-// A mesh as a part of the tool.
+// Prepares a mesh as a part of the tool.
 #pragma once
 
 #include <memory>
@@ -8,15 +8,16 @@
 
 namespace proxarm::models {
 
-// Its triangles in the tool's frame, with their fronts outside, and the same once more as a solid's points, edges and
-// faces, by the same numbers. It isn't convex: of its edges only ridges can touch.
+// A mesh in the tool's frame, stored twice: as triangles whose fronts are outside, and as a solid whose points, edges
+// and faces have the same indices. The solid isn't convex: only those of its edges that are ridges can touch an object.
 struct MeshPart {
   std::shared_ptr<const TriangleFeatures> features;
   Solid solid;
-  double thickness_m = 0.0;  // of its thinnest wall
+  double thickness_m = 0.0;  // thickness of the mesh's thinnest wall
 };
 
-// Throws std::invalid_argument for a mesh that is open, and where TriangleMesh and TriangleFeatures do.
+// Returns a mesh as a part of the tool. X transforms from the mesh's frame into the tool's. Throws
+// std::invalid_argument if the mesh is open, or if the constructor of TriangleMesh or TriangleFeatures throws it.
 MeshPart mesh_part(const MeshTool& shape, const Pose& X);
 
 }  // namespace proxarm::models

@@ -11,11 +11,14 @@ namespace {
 bool misses(const Vec3& n, const Vec3& left, const Vec3& right, double slack) noexcept {
   const Vec3 w = left.cross(right);
   const double size = w.norm();
-  if (size < 1e-6) return false;  // two faces in one plane, or back to back: nothing is said
+  // The faces lie in one plane or back to back: the cone isn't known, so nothing misses it
+  if (size < 1e-6) return false;
   return left.cross(n).dot(w) < -slack * size || n.cross(right).dot(w) < -slack * size || n.dot(left + right) < -slack;
 }
 
-// Corners go round counter-clockwise, seen from where the normal points.
+// Returns the square of a lower bound of the distance between p and a polygon; infinity if the bound exceeds `near`.
+// `height` is p's height over the polygon's plane. The corners are counter-clockwise, seen from where the normal
+// points.
 double distance2_to_polygon(const Vec3& normal, double height, std::span<const Vec3> points,
                             std::span<const std::uint32_t> corners, const Vec3& p, double near) noexcept {
   constexpr double too_far = std::numeric_limits<double>::infinity();
@@ -51,8 +54,11 @@ double distance2_of_segments(const EdgeLine& a, const EdgeLine& b) noexcept {
   return (r + s * d1 - t * d2).squaredNorm();
 }
 
-// Their common normal is outside of the faces' normals beside one of them (touch_edges_sharp() asks for that). It turns
-// by as much over the sine of the angle between the edges; twice that, for the normals it is compared with turn too.
+// 1. Two edges can hold each other only if their common normal n lies between the normals of the faces beside each edge
+//    (touch_edges_sharp() requires this).
+// 2. If an edge turns by `turn`, n turns by at most turn/sine, with the sine of the angle between the edges.
+// 3. The normals of the faces turn by at most `turn`.
+// 4. Two edges never hold each other if n misses by more than askew_rad plus twice the sum of both turns.
 bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcept {
   Vec3 n = (own.to - own.from).normalized().cross((other.to - other.from).normalized());
   const double sine = n.norm();

@@ -1,4 +1,4 @@
-// How near features are, and which of them may hold each other: first looks, for gathering pairs.
+// Quick tests for gathering pairs: how near two features are, and whether they may hold each other.
 #pragma once
 
 #include <algorithm>
@@ -22,15 +22,18 @@ inline double distance2_to_box(const Vec3& p, const Bounds& box) noexcept {
 
 double distance2_of_segments(const EdgeLine& a, const EdgeLine& b) noexcept;
 
-// Whether two sharp edges can't hold each other at any pose that is turned by up to `turn` (rad) from this one.
+// True only if two sharp edges can't hold each other at any pose that is turned by up to `turn` (rad) from the present
+// pose.
 bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcept;
 
-// By how much a corner and a face may turn until they touch, for the corner's cone of normals. Either may, and normals
-// of narrow faces are known to askew_rad only.
+// Returns the angle by which the cone of a corner must be widened if each body may turn by `turn` (rad) before the
+// corner touches a face. Both bodies may turn, hence twice `turn`. The normals of narrow faces are known only to
+// askew_rad.
 inline NormalCone::Angle turn_of_corners(double turn) noexcept { return NormalCone::Angle::of(askew_rad + 2.0 * turn); }
 
-// The square of what a point is at least away from a triangle, or from a face of a solid: by its height, and by how far
-// its foot lies beyond one of the sides. Beyond `near` it is infinite.
+// Return the square of a lower bound of the distance between a point and a triangle, or between a point and a face of a
+// solid. The bound consists of the point's height over the plane and of the distance by which its foot lies beyond one
+// of the face's sides. The result is infinite if the bound exceeds `near`.
 double distance2_within(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept;
 double distance2_within(const Solid& solid, const Solid::Face& face, const Vec3& p, double near) noexcept;
 

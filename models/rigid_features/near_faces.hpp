@@ -1,4 +1,7 @@
-// Which triangles come near a part of the tool, and what of the part comes near them.
+// Finds the triangles of a mesh that come near a solid, and the features of the solid that come near these triangles.
+//
+// The solid is a part of the tool and the mesh an object, or the other way round. T is the solid's frame in either
+// case.
 #pragma once
 
 #include <algorithm>
@@ -15,11 +18,12 @@ namespace proxarm::models {
 
 class NearFaces {
  public:
-  static constexpr std::size_t most_faces = 4096;  // of a mesh, near a part
-  static constexpr std::size_t most_edges = 6144;  // of a part: a hull of 2000 points has 5994 at most
+  static constexpr std::size_t most_faces = 4096;  // triangles of a mesh near a solid
+  static constexpr std::size_t most_edges = 6144;  // edges of a solid: a hull of 2000 points has at most 5994
 
-  // Of more triangles than `room` it takes none. The tool is on a body's side of its faces, or on either of an open
-  // one.
+  // If more than `room` triangles come near, all() is false and no features are found. `side`: on which side of a
+  // closed mesh's faces the solid is, 1 or −1; 0 for an open mesh. `at` transforms from T into the mesh's frame.
+  // `reach` in m; `turn`: by how much the solid may turn in the poses to come, rad.
   NearFaces(const Solid& solid, const Bounds& box_T, const TriangleFeatures& mesh, double side, const View& at,
             double reach, double turn, std::size_t room) noexcept
       : solid_(&solid), near_(reach + solid.radius), turn_(turn), corners_turn_(turn_of_corners(turn)) {
@@ -27,7 +31,7 @@ class NearFaces {
     around.each_face(mesh.mesh(), [&](std::uint32_t face, const Bounds& box) {
       if (count_ == room) return all_ = false;
       faces_[count_++] = face;
-      // Beyond the tool's own box nothing of it comes near.
+      // Only the part of the triangle's box that lies within the solid's box matters.
       const Vec3 low = box.low.cwiseMax(around.low_T()), high = box.high.cwiseMin(around.high_T());
       region_.low = count_ == 1 ? low : region_.low.cwiseMin(low);
       region_.high = count_ == 1 ? high : region_.high.cwiseMax(high);
@@ -46,22 +50,24 @@ class NearFaces {
   }
 
   [[nodiscard]] double near() const noexcept { return near_; }
-  [[nodiscard]] double turn() const noexcept { return turn_; }  // of poses to come, rad
+  // How much the solid may turn in the poses to come, rad.
+  [[nodiscard]] double turn() const noexcept { return turn_; }
   [[nodiscard]] const NormalCone::Angle& corners_turn() const noexcept { return corners_turn_; }
-  [[nodiscard]] bool all() const noexcept { return all_; }  // or there is no room for more
+  [[nodiscard]] bool all() const noexcept { return all_; }  // false: there was no room for all triangles
   [[nodiscard]] std::span<const std::uint32_t> faces() const noexcept { return {faces_.data(), count_}; }
-  // Whether a box of T comes near any of the triangles.
+  // Whether a box along the axes of T comes within `near` of the region of the triangles.
   [[nodiscard]] bool meets(const Vec3& low, const Vec3& high) const noexcept {
     return (low.array() <= region_.high.array() + near_).all() && (high.array() >= region_.low.array() - near_).all();
   }
-  // Whether what of the tool has such normals may rest on any of the triangles.
+  // Whether a feature of the solid with this cone of normals may rest on any of the triangles.
   [[nodiscard]] bool faces_some(const NormalCone& cone) const noexcept {
     return normals_.holds(-cone.axis, cone.half + corners_turn_);
   }
-  // The tool's faces that a vertex of the triangles may rest on.
+  // Returns the faces of the solid on which a vertex of the triangles may rest.
   [[nodiscard]] std::span<const std::uint16_t> facing() const noexcept { return {facing_.data(), facing_count_}; }
 
-  // Calls visit(edge) for the tool's edges whose box comes near another one of T.
+  // Calls visit(edge) for each edge of the solid whose box comes within `near` of the box from `low` to `high`, in T.
+  // Only edges that may touch the triangles are visited.
   template <typename Visit>
   void each_crossing(const Vec3& low, const Vec3& high, Visit visit) const noexcept {
     const Vec3 least = low - Vec3::Constant(near_), most = high + Vec3::Constant(near_);
@@ -71,8 +77,8 @@ class NearFaces {
     }
   }
 
-  // Whether a point of T is further than near before one of the tool's faces. What is asked next often is so for the
-  // same one.
+  // Whether a point of T lies more than `near` in front of one of the faces in facing(). This face is remembered and
+  // tried first for the next point.
   [[nodiscard]] bool beyond(const Vec3& y) noexcept {
     if (beyond_last(y, y)) return true;
     for (std::size_t i = 0; i < facing_count_; ++i) {
@@ -82,7 +88,8 @@ class NearFaces {
     }
     return false;
   }
-  // Whether two, and so all between them, are before the one that told last.
+  // Whether two points, and so all points between them, lie more than `near` in front of the face that beyond() found
+  // last.
   [[nodiscard]] bool beyond_last(const Vec3& y, const Vec3& z) const noexcept {
     return witness_ < facing_count_ && std::min(height(witness_, y), height(witness_, z)) > near_;
   }
@@ -92,13 +99,13 @@ class NearFaces {
     const Solid::Face& face = solid_->faces[facing_[i]];
     return face.normal.dot(y) - face.offset;
   }
-  // Whether a vertex of the triangles may rest on a face of the tool, by where the face is and by its normal.
+  // Whether a vertex of the triangles may rest on a face of the solid: tests the place and the normal of the face.
   [[nodiscard]] bool may_hold(std::uint32_t index) const noexcept {
     const Solid::Around& around = solid_->around_faces[index];
     return meets(around.low, around.high) &&
            normals_.holds(-solid_->faces[index].normal, solid_->cones.around_faces[index] + corners_turn_);
   }
-  // Around the normals of all triangles and of those that share corners with them.
+  // Returns the cone around the normals of all triangles and of all triangles that share a corner with them, in T.
   [[nodiscard]] NormalCone cone_around(const TriangleFeatures& mesh, const Mat3& to_T) const noexcept {
     Vec3 sum = Vec3::Zero();
     for (const std::uint32_t face : faces()) sum += face_of(mesh, face).normal;
@@ -120,9 +127,9 @@ class NearFaces {
   const Solid* solid_;
   double near_, turn_;
   NormalCone::Angle corners_turn_;
-  Bounds region_;  // in T, of the triangles' part within the tool's box
+  Bounds region_;  // box in T around those parts of the triangles that lie within the solid's box
   std::array<std::uint32_t, most_faces> faces_;
-  NormalCone normals_;  // of the triangles, in T
+  NormalCone normals_;  // cone around the normals of the triangles, in T
   std::array<std::uint16_t, most_edges> facing_, crossing_;
   std::size_t count_ = 0, facing_count_ = 0, crossing_count_ = 0, witness_ = 0;
   bool all_ = true;

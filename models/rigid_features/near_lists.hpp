@@ -1,5 +1,5 @@
-// What of meshes is near, of each pair of a part of the tool and an object, as far around a pose as it says. A list is
-// made once for several looks, which ask less far around poses nearby.
+// Lists the leaves or triangles of meshes that are near each other, for each pair of a part of the tool and an object.
+// A list is made for a pose and a reach. It then serves several searches with smaller reaches at poses nearby.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ template <typename Item>
 class NearList {
  public:
   using Items = std::span<const Item>;
-  // For so many, of so many pairs of a part and an object. (Nothing is allocated later.)
+  // Allocates memory for `most` items and for `pairs` pairs of a part and an object. Nothing is allocated later.
   void make_room(std::size_t most, std::size_t pairs) {
     list_.resize(most);
     begins_.resize(pairs);
@@ -31,7 +31,7 @@ class NearList {
     count_ = pairs_ = 0;
   }
   void begin_with(std::uint16_t part, std::uint16_t entry) noexcept { begins_[pairs_++] = {part, entry, count_}; }
-  // False where there is no room: then the list lacks something.
+  // Returns false if there is no room. The list is then incomplete: all() is false.
   bool add(const Item& item) noexcept {
     if (count_ == list_.size()) return all_ = false;
     list_[count_++] = item;
@@ -43,7 +43,7 @@ class NearList {
   [[nodiscard]] const ToolPose& at() const noexcept { return at_; }
   [[nodiscard]] double reach() const noexcept { return reach_; }
   [[nodiscard]] std::size_t count() const noexcept { return count_; }
-  // Nothing: of these two there is no list.
+  // Returns the items of a part and an object; nullopt if there is no list of these two.
   [[nodiscard]] std::optional<Items> of(std::uint16_t part, std::uint16_t entry) const noexcept {
     for (std::size_t k = 0; k < pairs_; ++k) {
       if (begins_[k].part != part || begins_[k].entry != entry) continue;
@@ -66,7 +66,7 @@ class NearList {
   double reach_ = 0.0;
 };
 
-using NearLeaves = NearList<MeshPairs::Leaves>;  // of the tool's mesh and of an object's
-using NearTriangles = NearList<std::uint32_t>;   // of the one that is a mesh
+using NearLeaves = NearList<MeshPairs::Leaves>;  // a leaf of the tool's mesh and a leaf of an object's mesh
+using NearTriangles = NearList<std::uint32_t>;   // triangles of the part or of the object, whichever is a mesh
 
 }  // namespace proxarm::models

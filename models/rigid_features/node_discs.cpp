@@ -5,10 +5,12 @@
 namespace proxarm::models {
 namespace {
 
-// Nodes of more triangles than this get the ball around their box: few are asked for, and what they hold bends.
+// A node with more triangles than this gets the ball around its box instead of a thin disc. Searches visit few such
+// nodes, and so many triangles are rarely flat.
 constexpr std::uint32_t kMostFaces = 512;
 
-// In float, never less. Coordinates and their sums are rounded by some 1e-16 of their size.
+// Returns `size` as a float that is never smaller. Coordinates of the size `of_coordinates` and their sums are rounded
+// by some 1e-16 of that size.
 float at_least(double size, double of_coordinates) noexcept {
   const double rounding = 16.0 * std::numeric_limits<double>::epsilon() * of_coordinates;
   return std::nextafter(static_cast<float>(size + rounding), std::numeric_limits<float>::infinity());
@@ -23,7 +25,8 @@ NodeDisc ball_around(const TriangleMesh::NodePair& pair, std::size_t k) noexcept
   return disc;
 }
 
-// Of the triangles from `begin` to `end`. Its axis is their mean normal; if there is none, any will do.
+// Returns the disc around the triangles from `begin` to `end`. Its axis is the mean normal of the triangles. If the
+// mean is zero, any axis is correct.
 NodeDisc disc_of(const TriangleMesh& mesh, std::uint32_t begin, std::uint32_t end) noexcept {
   Vec3 sum = Vec3::Zero(), low = mesh.corner(begin, 0), high = low;
   for (std::uint32_t f = begin; f < end; ++f) {
@@ -61,7 +64,8 @@ NodeDisc disc_of(const TriangleMesh& mesh, std::uint32_t begin, std::uint32_t en
 
 }  // namespace
 
-// A node's triangles follow each other, and those of its first node come before the second's.
+// The triangles of a node have consecutive indices: first the triangles of its first child, then those of its second
+// child.
 NodeDiscs::NodeDiscs(const TriangleMesh& mesh) {
   const auto& nodes = mesh.structure().nodes;
   struct Range {
@@ -69,7 +73,8 @@ NodeDiscs::NodeDiscs(const TriangleMesh& mesh) {
   };
   std::vector<Range> ranges(2 * nodes.size());
   discs_.resize(2 * nodes.size());
-  // Nodes come before those within them; the root is alone in its pair.
+  // Parents come before their children, so the loop runs backwards. The root is the only node in its pair, so index 1
+  // is skipped.
   for (std::size_t i = discs_.size(); i-- > 0;) {
     const std::size_t pair = i / 2, k = i % 2, within = 2 * std::size_t{nodes[pair].first[k]};
     if (i == 1) continue;

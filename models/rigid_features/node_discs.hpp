@@ -1,5 +1,5 @@
-// How flat a mesh is, node by node of its tree: a box along the axes is as thick as its triangles lean, a disc along
-// them only as thick as they bend.
+// Encloses the triangles of each node of a mesh's tree in a disc. If flat triangles lean, a box along the axes becomes
+// thick; a disc along the triangles stays thin. Its thickness depends only on how much the triangles bend.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace proxarm::models {
 
-// All vertices of a node's triangles are within `half` of the disc's middle along its axis, within `radius` of it
-// across, and within `ball` of it. Metres, never too small.
+// Bounds of the vertices of a node's triangles, in metres, rounded up. Each vertex is at most `half` away from the
+// middle along the axis, at most `radius` away across the axis, and at most `ball` away in total.
 struct NodeDisc {
   Vec3 middle = Vec3::Zero(), axis = Vec3::UnitZ();
   float half = 0.0F, radius = 0.0F, ball = 0.0F;
@@ -23,10 +23,10 @@ class NodeDiscs {
   NodeDiscs() = default;
   explicit NodeDiscs(const TriangleMesh& mesh);
 
-  // By twice the index of a pair of nodes, and which one it is.
+  // `index` is twice the index of a pair of nodes, plus 0 or 1 for the node in the pair.
   [[nodiscard]] const NodeDisc& of(std::uint32_t index) const noexcept { return discs_[index]; }
   [[nodiscard]] bool any() const noexcept { return !discs_.empty(); }
-  // Of one that is asked for soon.
+  // Loads a disc that is needed soon into the cache.
   void prefetch(std::uint32_t index) const noexcept {
     constexpr std::size_t line = 64;
     const char* at = reinterpret_cast<const char*>(&discs_[index]);
@@ -43,9 +43,10 @@ struct FlatMesh {
   const NodeDiscs& discs;
 };
 
-// Whether more than `near` is between both balls, or between both discs along one of their axes.
+// Whether the balls of two nodes are more than `near` apart, or whether their discs are, measured along one disc's
+// axis.
 [[nodiscard]] inline bool apart(const NodeDisc& a, const NodeDisc& b, double near) noexcept {
-  constexpr double rounding = 4e-15;  // of a cosine's square, of which a sine is made
+  constexpr double rounding = 4e-15;  // rounding of cosine², from which the sine is computed
   const Vec3 way = b.middle - a.middle;
   const double most = double{a.ball} + double{b.ball} + near;
   if (way.squaredNorm() > most * most) return true;

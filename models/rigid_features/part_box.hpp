@@ -1,4 +1,4 @@
-// Which triangles of a mesh come near a part of the tool.
+// Finds the triangles of a mesh that come near a solid. T is the solid's frame.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,8 @@
 
 namespace proxarm::models {
 
-// The box of a part's points, which turns with the tool, the ball around them, and so much around both.
+// A box around the solid's points along the axes of T and a ball around these points, both enlarged by `near`. `at`
+// transforms from T into the mesh's frame.
 class PartBox {
  public:
   PartBox(const Solid& solid, const Bounds& box, const View& at, double near) noexcept
@@ -20,7 +21,7 @@ class PartBox {
     half_T_ = 0.5 * (box.high - box.low) + Vec3::Constant(near);
     double ball = 0.0;
     for (const Vec3& p : solid.points) ball = std::max(ball, (p - middle_T_).squaredNorm());
-    for (const Solid::Rim& rim : solid.rims) {  // a cylinder's are about its middle
+    for (const Solid::Rim& rim : solid.rims) {  // the middle of the box lies on the axis of both rims
       ball = std::max(ball, (rim.centre - middle_T_).squaredNorm() + rim.radius * rim.radius);
     }
     ball2_ = (std::sqrt(ball) + near) * (std::sqrt(ball) + near);
@@ -31,10 +32,11 @@ class PartBox {
   [[nodiscard]] Vec3 low_T() const noexcept { return middle_T_ - half_T_; }
   [[nodiscard]] Vec3 high_T() const noexcept { return middle_T_ + half_T_; }
 
-  // Calls visit(face, its box in T) for each that comes so near, and a few that don't, until it returns false.
+  // Calls visit(face, box of the face in T) for all faces within `near` of the solid, and for a few others, until visit
+  // returns false.
   template <typename Visit>
   void each_face(const TriangleMesh& mesh, Visit visit) const noexcept {
-    constexpr std::size_t depth = 64;  // each level halves the number of faces
+    constexpr std::size_t depth = 64;  // each level of the tree halves the number of faces
     const std::vector<TriangleMesh::NodePair>& nodes = mesh.structure().nodes;
     std::array<std::uint32_t, depth> stack;
     std::size_t top = 0;
@@ -53,7 +55,7 @@ class PartBox {
     }
   }
 
-  // The same of one face.
+  // Does the same for one face. Returns false if visit did.
   template <typename Visit>
   bool look_at(const TriangleMesh& mesh, std::uint32_t face, Visit& visit) const noexcept {
     Bounds box;
@@ -70,7 +72,8 @@ class PartBox {
   }
 
  private:
-  // This box and one along the axes of W, by the six axes of both.
+  // Whether the enlarged box meets a box along the axes of the mesh's frame: compares them along the three axes of each
+  // box.
   [[nodiscard]] bool reaches(const Vec3& low, const Vec3& high) const noexcept {
     const Vec3 way = 0.5 * (low + high) - middle_, half = 0.5 * (high - low);
     if ((way.cwiseAbs() - half - half_).maxCoeff() > 0.0) return false;
@@ -78,7 +81,8 @@ class PartBox {
     return ((at_.R.transpose() * way).cwiseAbs() - spread_.transpose() * half - half_T_).maxCoeff() <= 0.0;
   }
 
-  // Whether a ball of T may come near a sphere or a capsule.
+  // Whether a ball in T comes within `near` of the points of the solid. Precondition: the solid is a sphere or a
+  // capsule.
   [[nodiscard]] bool near_round(const Vec3& centre, double radius) const noexcept {
     const double most = near_ + radius;
     if (solid_->edges.empty()) return (centre - solid_->points.front()).squaredNorm() <= most * most;
@@ -88,8 +92,9 @@ class PartBox {
   const Solid* solid_;
   View at_;
   double near_, ball2_ = 0.0;
-  Vec3 middle_T_, half_T_;  // of the part's box, and so much around it
-  Vec3 middle_, half_;      // the same in W, along its axes
+  Vec3 middle_T_, half_T_;  // middle and half size of the enlarged box, in T
+  // middle in the mesh's frame, and half size of the box along this frame's axes around the enlarged box
+  Vec3 middle_, half_;
   Mat3 spread_;
 };
 

@@ -47,7 +47,8 @@ void RigidMover::arrive() noexcept {
   turn_.setZero();
 }
 
-// In the object's frame a point y of W is at Rᵀ(y − c) from the centre c.
+// In the object's frame, Rᵀ(y − c) leads from the centre c to a point y that rests in W. Its change is bounded by the
+// motion of c and by the turn times the distance.
 double RigidMover::way_m(const Vec3& x, double around) const noexcept {
   if (rests_) return 0.0;
   const double turn = turn_.norm();

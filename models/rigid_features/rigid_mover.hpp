@@ -1,7 +1,9 @@
-// An object that moves while a rigid tool touches it: where it was at q(k−1), where it is at q(k), and the way between.
+// An object that moves while a rigid tool touches it: its place at q(k−1), its place at q(k), and the motion between
+// them.
 //
-// A step may be taken in parts. The object then goes from one place to the other at a steady pace: its centre straight
-// ahead, and it turns about that. Both ends are the given ones, bit for bit.
+// A step may be taken in parts. The object then goes from the first place to the second at constant speed: its centre
+// moves along a straight line, and the object turns about its centre. The first and last place are equal to the given
+// ones to the bit.
 #pragma once
 
 #include "models/geometry/geometric_algorithm.hpp"
@@ -10,7 +12,7 @@
 
 namespace proxarm::models {
 
-// Of a frame in W.
+// The pose of an object's frame in W.
 struct Placement {
   Mat3 R = Mat3::Identity();
   Vec3 x = Vec3::Zero();
@@ -28,30 +30,35 @@ struct Placement {
 class RigidMover {
  public:
   explicit RigidMover(const ScriptedMotion& script);
-  // Driven: it stands where it was described until drive() is called. `centre` is about where it is then.
+  // A driven object stays in its described place until drive() is called. `centre`: roughly the object's middle in that
+  // place; the object turns about it.
   explicit RigidMover(const Vec3& centre) : centre_(centre) {}
 
-  // A scripted object's place at this time; from where it was a period ago. Of a driven one: nothing.
+  // Begins a step of a scripted object, from its place one period before the given time to its place at that time. Does
+  // nothing for a driven object.
   void set_time(const StepTime& time) noexcept;
-  // Relative to where it was described. Of a scripted object: nothing.
+  // Begins a step of a driven object, from its present place to the place X. X is relative to the object's described
+  // place. Does nothing for a scripted object.
   void drive(const Pose& X) noexcept;
   [[nodiscard]] bool driven() const noexcept { return !scripted_; }
 
-  // To a share of the step's way: 0 is where the object was, 1 where it is.
+  // Puts the object to a share of the step's motion: 0 is its place at q(k−1), 1 its place at q(k).
   void go(double share) noexcept;
-  // The step is over. Another one without set_time() or drive() finds the object at rest.
+  // Ends the step. If the next step begins without set_time() or drive(), the object rests in it.
   void arrive() noexcept;
 
   [[nodiscard]] const Placement& at() const noexcept { return at_; }
   [[nodiscard]] const Placement& was() const noexcept { return was_; }
   [[nodiscard]] const Placement& is() const noexcept { return is_; }
-  [[nodiscard]] bool rests() const noexcept { return rests_; }  // in this step
-  // Where a point would be now that was at x at the step's beginning, and has moved with the object.
+  [[nodiscard]] bool rests() const noexcept { return rests_; }  // the object doesn't move in this step
+  // Returns the present place, in W, of a point that was at x at the step's beginning and moves with the object.
   [[nodiscard]] Vec3 carried(const Vec3& x) const noexcept { return rests_ ? x : at_ * was_.back(x); }
 
-  // How far points come at most in all of the step, seen from the object, that stay within `around` of x in W.
+  // Returns how far a point that rests in W, within `around` of x, moves at most in the whole step as seen from the
+  // object, m.
   [[nodiscard]] double way_m(const Vec3& x, double around) const noexcept;
-  // Of the coordinates that places are rounded in.
+  // Returns the sum of the absolute coordinates of the object's position, m. The rounding of points on the object grows
+  // with it.
   [[nodiscard]] double size_m() const noexcept { return at_.x.lpNorm<1>(); }
 
  private:
@@ -60,9 +67,10 @@ class RigidMover {
 
   ScriptedMotion script_;
   bool scripted_ = false;
-  Vec3 centre_ = Vec3::Zero();  // in the object's frame: what it turns about
+  Vec3 centre_ = Vec3::Zero();  // the point about which the object turns, in the object's frame
   Placement was_, is_, at_;
-  Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();  // of the centre; rad
+  // motion of the centre in the step, m; rotation vector of the step, rad
+  Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();
   bool rests_ = true;
   double time_s_ = 0.0;
 };

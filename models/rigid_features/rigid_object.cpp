@@ -9,8 +9,8 @@
 namespace proxarm::models {
 namespace {
 
-// Faces whose normals differ by less lie in one plane: a tool's point over their common edge is no nearer to it than to
-// the faces, to within this share of its distance from the edge.
+// Neighbouring faces count as one plane if their normals differ by less than this angle, rad. If a tool's point is over
+// the common edge of such faces, its distance from the edge equals its distance from the faces, to within this share.
 constexpr double kFlat = 1e-9;
 
 }  // namespace
@@ -25,7 +25,7 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
     cones_.of_corners.resize(mesh_->structure().vertices.size());
     cones_.around_faces.resize(mesh_->size());
   }
-  // All half-edges, sorted, so that those of one edge are neighbours.
+  // All half-edges, sorted so that the half-edges of an edge follow each other.
   struct Half {
     std::uint32_t low, high, face, opposite;
     std::uint8_t bit;
@@ -74,7 +74,7 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
     }
     i = end;
   }
-  // The owner of a vertex must be a face that has it: the first sharp edge's is one.
+  // A vertex must be owned by one of its own faces. The owner of the vertex's first sharp edge is one of them.
   for (std::uint32_t v = 0; v < vertices; ++v) {
     if (owner[v] != none) vertices_by_face.emplace_back(owner[v], v);
   }
@@ -91,10 +91,12 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
   sort_out(vertices_by_face, owned_vertices_, first_vertex_);
 }
 
-// A mesh may be several bodies, and have hollows: of each piece that hangs together the largest face is asked.
+// Returns on which side the fronts of the faces are, as outwards() does. A mesh may consist of several bodies, and a
+// body may have hollows. Therefore the largest face of each connected piece is tested.
 double TriangleFeatures::front_side() const {
   const auto faces = static_cast<std::uint32_t>(mesh_->size());
-  std::vector<std::uint32_t> up(mesh_->structure().vertices.size());  // to the vertex that stands for its piece
+  // leads from a vertex to the vertex that represents its piece
+  std::vector<std::uint32_t> up(mesh_->structure().vertices.size());
   std::iota(up.begin(), up.end(), 0U);
   const auto piece_of = [&up](std::uint32_t v) {
     while (up[v] != v) v = up[v] = up[up[v]];
@@ -116,7 +118,8 @@ double TriangleFeatures::front_side() const {
   for (const std::uint32_t f : largest) {
     if (f == none) continue;
     const Vec3 middle = (mesh_->corner(f, 0) + mesh_->corner(f, 1) + mesh_->corner(f, 2)) / 3.0;
-    // Before the face, nearer than another one is: a millionth of its size, and far above rounding.
+    // A point in front of the face, so near that no other face lies between: a millionth of the face's size away, and
+    // far above rounding.
     const Vec3 before = middle + std::max(1e-6 * std::sqrt(area(f)), 16.0 * mesh_->lift_m()) * mesh_->face(f).normal;
     const double here = mesh_->encloses(before) ? -1.0 : 1.0;
     if (side != 0.0 && here != side)

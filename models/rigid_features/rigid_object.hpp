@@ -1,4 +1,4 @@
-// What a rigid tool can touch, as RigidWorld is built from it.
+// The objects that a rigid tool can touch. RigidWorld is built from them.
 #pragma once
 
 #include <array>
@@ -15,36 +15,38 @@
 
 namespace proxarm::models {
 
-// A surface of triangles. Of a closed one, a body's, one side holds; of an open one both, as for a point proxy. Only
-// what can be touched counts: an edge or a vertex whose faces lie in one plane is left out, since the tool's points and
-// edges meet the faces first.
+// The features of a mesh: faces, edges and vertices. A closed mesh is the surface of a body and holds the tool on one
+// side; an open mesh holds it on both sides, as for a point proxy. An edge or a vertex whose faces all lie in one plane
+// is left out, because the tool's points and edges meet the faces first.
 class TriangleFeatures {
  public:
   struct Edge {
     EdgeLine line;
-    bool ridge = true;  // seen from the faces' front; otherwise a valley, which is a ridge from behind
+    bool ridge = true;  // as seen from the front of the faces; false: a valley, which is a ridge as seen from behind
   };
 
-  // Throws std::invalid_argument for a closed mesh with an edge that more than two faces share, or with faces of which
-  // some have their fronts outside and others inside.
+  // Throws std::invalid_argument if more than two faces of a closed mesh share an edge, or if the fronts of some faces
+  // are outside and those of others inside.
   explicit TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh);
 
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
-  // Of a closed mesh: 1 if its faces' fronts are outside, −1 if inside. Of an open one: 0.
+  // Returns 1 if the mesh is closed and the fronts of its faces are outside, −1 if they are inside, 0 if the mesh is
+  // open.
   [[nodiscard]] double outwards() const noexcept { return outwards_; }
   [[nodiscard]] std::size_t edges() const noexcept { return edges_.size(); }
   [[nodiscard]] const Edge& edge(std::uint32_t i) const noexcept { return edges_[i]; }
   [[nodiscard]] const std::array<std::uint32_t, 2>& ends(std::uint32_t edge) const noexcept { return ends_[edge]; }
   [[nodiscard]] const Vec3& vertex(std::uint32_t i) const noexcept { return mesh_->vertex(i); }
-  // Of a body's vertex, as seen from its faces' fronts.
+  // Returns the normal cone of a vertex, made of the normals at the fronts of its faces. For an open mesh the cone
+  // contains all directions.
   [[nodiscard]] const NormalCone& cone(std::uint32_t vertex) const noexcept { return cones_.of_corners[vertex]; }
   [[nodiscard]] const NormalCone::Angle& around(std::uint32_t face) const noexcept { return cones_.around_faces[face]; }
-  // Which of a face's edges are valleys, seen from its front (side 1) or from behind (−1): bit k for the one from
-  // corner k to the next.
+  // Returns which edges of a face are valleys, as seen from its front (`side` is 1) or from behind (−1). Bit k belongs
+  // to the edge from corner k to the next corner.
   [[nodiscard]] std::uint8_t valleys_of(std::uint32_t face, double side) const noexcept {
     return bends_[face][side > 0.0 ? 0 : 1];
   }
-  // The edges and vertices that a face owns; each belongs to one face.
+  // Return the edges and vertices that a face owns. Each edge and each vertex has exactly one owner.
   [[nodiscard]] std::span<const std::uint32_t> edges_of(std::uint32_t face) const noexcept {
     return owned(owned_edges_, first_edge_, face);
   }
@@ -63,30 +65,31 @@ class TriangleFeatures {
 
   std::shared_ptr<const TriangleMesh> mesh_;
   double outwards_ = 0.0;
-  NormalCones cones_;  // of a body; of an open mesh they hold any direction
+  NormalCones cones_;  // for an open mesh each cone contains all directions
   std::vector<Edge> edges_;
-  std::vector<std::array<std::uint32_t, 2>> ends_;  // of each edge, its vertices
-  std::vector<std::array<std::uint8_t, 2>> bends_;  // of each face, its valleys and its ridges
+  std::vector<std::array<std::uint32_t, 2>> ends_;  // for each edge, its two vertices
+  std::vector<std::array<std::uint8_t, 2>> bends_;  // for each face, the bits of its valleys and the bits of its ridges
   std::vector<std::uint32_t> owned_edges_, first_edge_, owned_vertices_, first_vertex_;
 };
 
-// By a script, or driven from outside; relative to where the object was described.
+// An object's motion relative to its described place. It follows a script, or the caller drives the object.
 struct RigidMotion {
   ScriptedMotion script;
-  bool driven = false;  // the script doesn't count
+  bool driven = false;  // the caller drives the object, and `script` is ignored
 };
 
 struct RigidObject {
-  // In W, where it was described. A hollow one may need several: a box from inside is six sides.
+  // In W, at the pose in the scene's file. A hollow object may need several RigidObjects: a box from inside is six flat
+  // sides.
   std::variant<FlatSide, HollowSphere, HollowTube, Solid, std::shared_ptr<const TriangleFeatures>> shape;
   double friction = 0.0;
-  std::int32_t object = 0;  // what contacts report
-  bool inside_out = false;  // of a closed mesh: the tool is inside of it. Other shapes say that by themselves
+  std::int32_t object = 0;  // the object's number, which contacts report
+  bool inside_out = false;  // closed meshes only: the tool is inside the mesh. Ignored for other shapes
   std::optional<RigidMotion> motion{};
 };
 
-// Calls with the object's shape where that is one that a point alone is held by: flat or hollow. (std::visit may
-// throw.)
+// Calls function(shape) if the object's shape is flat or hollow; only points and rims of the tool touch such shapes.
+// (std::visit isn't used because it may throw.)
 template <typename Function>
 void with_flat_or_hollow(const RigidObject& object, Function function) noexcept {
   if (const auto* flat = std::get_if<FlatSide>(&object.shape)) {

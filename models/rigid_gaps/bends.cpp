@@ -10,11 +10,13 @@
 namespace proxarm::models {
 namespace {
 
-// Of sine². Edges that cross at more than 13° meet at a place that goes along them by no more than four times what it
-// goes across: the iteration finds it without the gap's curvature.
+// Bound of sine² of the angle between two edges. If edges cross at more than 13°, their place of contact moves along
+// the edges by at most four times the motion across them. The iteration then finds the place without the gap's
+// curvature.
 constexpr double kCrossing = 0.05;
 
-// The curvature of a hollow surface at a point: 1/m, in the directions of P. A plane has none.
+// The curvature of a hollow surface at a point, 1/m, in the directions of the projection P. A plane has the curvature
+// 0.
 struct Round {
   Mat3 P = Mat3::Zero();
   double curvature = 0.0;
@@ -36,7 +38,7 @@ Round round_at(const HollowTube& hollow, const Vec3& x) noexcept {
   return {Mat3::Identity() - a * a.transpose(), 1.0 / (x - hollow.from - s * along).norm()};
 }
 
-// A point or a rim in something hollow, or a rim over a plane.
+// Adds the bend of a point or a rim in a hollow object, or of a rim over a plane.
 bool add_bend_in_field(const RigidBodies& bodies, const Pair& pair, const Found& found, const ToolPose& pose,
                        double force, Mat6& K) noexcept {
   const bool is_rim = pair.kind == PairKind::rim_field;
@@ -55,7 +57,7 @@ bool add_bend_in_field(const RigidBodies& bodies, const Pair& pair, const Found&
   const Eigen::Matrix<double, 3, 6> G = motion_of_point(x - pose.position);
   Mat6 bend = Mat6::Zero();
   if (round.curvature > 0.0) bend = G.transpose() * across * G;
-  // Of a rim that is nearly level only the first place is a lowest one; the other places are held as they are.
+  // If a rim is nearly level, only its first place is a lowest place. The other places are fixed points of the rim.
   if (is_rim && (is_tube || found.which == 0)) {
     const Solid::Rim& rim = own.rims[pair.own];
     const Vec3 arm = x - pose * rim.centre, along = (pose.orientation * rim.u.cross(rim.v)).cross(arm);
@@ -72,7 +74,8 @@ bool add_bend_in_field(const RigidBodies& bodies, const Pair& pair, const Found&
   return true;
 }
 
-// A rim over a face, of either body: only the rim bends, and its lowest place goes around it.
+// Adds the bend of a rim over a face. The rim belongs to the tool or to the object. The face is flat; the gap bends
+// because the lowest place moves around the rim.
 bool add_bend_of_rim(const RigidBodies& bodies, const Pair& pair, const Found& found, const ToolPose& pose,
                      double force, Mat6& K) noexcept {
   if (found.which != 0) return false;
@@ -91,7 +94,8 @@ bool add_bend_of_rim(const RigidBodies& bodies, const Pair& pair, const Found& f
       axis = on->R * axis;
     }
   }
-  // (The tool's point lies on the face if the rim is the object's; the rim's point is a gap away.)
+  // If the rim belongs to the object, the touch's point lies on the tool's face, and the rim's point is one gap away
+  // from it.
   const Vec3 &n = found.touch.normal, x = ours ? found.touch.point : Vec3(found.touch.point - found.touch.gap * n);
   const Vec3 arm = x - centre, along = axis.cross(arm);
   const double h_aa = -std::abs(n.dot(arm));

@@ -1,4 +1,4 @@
-// Of the features that the tool is behind: which of them hold it.
+// Decides which of the features that the tool is behind hold the tool.
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -8,13 +8,15 @@
 namespace proxarm::models {
 namespace {
 
-// A sine. Steps that are long beside a tool turn it by tenths of a radian on their way.
+// A sine: the angle by which a solid may lean into a face. A step that is long compared with the tool turns the tool by
+// some tenths of a radian.
 constexpr double kLeans = 0.2;
-// How far a body may reach beyond the plane of a contact: normals of edges that cross at 1e-7 rad are rounded by
-// 1e-9 rad, and bodies are up to a metre long. Beyond a lawful plane they reach less, beyond a false one millimetres.
+// How far a body may reach beyond the plane of a contact. Normals of edges that cross at 1e-7 rad are rounded by 1e-9
+// rad, and bodies are up to a metre long, so beyond a correct plane bodies reach less than this. Beyond a false plane
+// they reach millimetres.
 constexpr double kBeyond_m = 1e-6;
 
-// Whether a part of an edge is behind both of the faces beside another one, as far as these go on.
+// Whether a part of an edge is behind both faces beside the edge `wedge`; these faces are taken as endless planes.
 bool enters(const EdgeLine& edge, const EdgeLine& wedge) noexcept {
   double low = 0.0, high = 1.0;
   for (const Vec3& n : {wedge.left, wedge.right}) {
@@ -26,7 +28,8 @@ bool enters(const EdgeLine& edge, const EdgeLine& wedge) noexcept {
   return low <= high;
 }
 
-// Whether the line along an edge goes through a convex solid. (A ridge may be several edges of a mesh.)
+// Whether the endless line along an edge goes through a convex solid. The line is endless because a ridge may consist
+// of several edges of a mesh.
 bool pierces(const EdgeLine& edge, const Solid& solid) noexcept {
   double low = -std::numeric_limits<double>::infinity(), high = -low;
   for (const Solid::Face& face : solid.faces) {
@@ -71,23 +74,25 @@ class DeeperTouches {
   Touches& touches_;
 };
 
-// Whether both touches are of one point, of the tool or of the object.
+// Whether both pairs have the same point of the tool, or the same point of the object.
 bool same_point(const Pair& a, const Pair& b) noexcept {
   if (a.kind != b.kind || a.part != b.part || a.entry != b.entry) return false;
   return a.kind == PairKind::point_face ? a.own == b.own : a.kind == PairKind::face_point && a.other == b.other;
 }
 
-// Whether the foot of the deeper touch on its face is behind the other face.
+// Whether the foot of the touch `deep` on its face is behind the face of the touch `other`.
 bool is_behind(const Found& deep, const Found& other, bool of_tool) noexcept {
   if (of_tool) return other.touch.normal.dot(other.touch.point - deep.touch.point) < kGap_m;
   const Vec3 foot = deep.touch.point - deep.touch.gap * deep.touch.normal;
   return other.touch.normal.dot(foot - (other.touch.point - other.touch.gap * other.touch.normal)) < kGap_m;
 }
 
-// Two sharp edges that cross far behind each other hold nothing where another feature of the two solids keeps them
-// apart, as where a corner lies on a side of a box, below its top: along that feature's normal all of one solid is
-// before all of the other, or next to it. Crossing edges at a depth g leave no more than g cos φ along a normal at an
-// angle φ to their own, so that half of g comes from another side only.
+// Whether two sharp edges that cross far behind each other hold nothing, because another pair of features of the two
+// solids keeps the solids apart. (Example: a corner lies on a side of a box, below the box's top.)
+// 1. The solids are kept apart if, along the other pair's normal, the gap between the whole solids is more than half of
+//    the edges' negative gap g.
+// 2. Crossing edges with the gap g leave at most g cos φ along a normal at an angle φ to their own normal. So only
+//    normals with cos φ of at most 0.5 are tried.
 bool DeeperTouches::is_beside(const Found& deep) const noexcept {
   const Pair& pair = candidates_.pairs[deep.pair];
   const Solid* other = bodies_.entry(pair).solid();
@@ -108,11 +113,14 @@ bool DeeperTouches::is_beside(const Found& deep) const noexcept {
   return false;
 }
 
-// An edge of a convex solid and one of a mesh that cross behind each other hold nothing where the solid is beside the
-// mesh's edge. Where that is sharper than 90°, the place behind it may lie before one of its faces, and an edge that
-// ends there, with its corner on that face, isn't in the mesh; nor is the mesh's edge in the solid. One of both would
-// not be enough: an edge that ends before it comes to the mesh may go on as the next one at a corner that is nearly
-// flat, and what holds them out is this pair alone.
+// Whether an edge of a convex solid and an edge of a mesh that cross behind each other hold nothing, because the solid
+// is beside the mesh's edge. (If the mesh's edge is sharper than 90°, a place behind the edge may lie in front of one
+// of the edge's faces. A solid's edge that ends there, with its corner on that face, isn't inside the mesh.) Two
+// conditions must both be true:
+// 1. No part of the solid's edge is behind both faces of the mesh's edge.
+// 2. The mesh's edge doesn't go through the solid. Condition 1 alone isn't enough: the solid's edge may end before it
+//    reaches the mesh and continue, at a nearly flat corner, as the next edge. This pair alone may then keep solid and
+//    mesh apart.
 bool DeeperTouches::passes_by(const Found& deep) const noexcept {
   const Pair& pair = candidates_.pairs[deep.pair];
   if (pair.kind != PairKind::edges) return false;
@@ -132,15 +140,15 @@ bool DeeperTouches::passes_by(const Found& deep) const noexcept {
   return passes(*solid, pair.other, moved_edge(edge_of(part.solid, pair.own), seen));
 }
 
-// Whether a solid would stand in a face on which a corner of it lies: parts of it are behind that face by far, seen
-// from the corner. Such a face holds the corner of no lawful pose near this one.
+// Whether a solid whose corner lies on a face leans far into the face: seen from the corner, other points of the solid
+// are far behind the face. Such a face can't hold the corner at any correct pose near the present pose.
 bool DeeperTouches::leans_into(const Found& corner) const noexcept {
   const Pair& pair = candidates_.pairs[corner.pair];
   const Solid* other = bodies_.entry(pair).solid();
   if (other == nullptr) return false;
   const bool own_corner = pair.kind == PairKind::point_face;
-  if (own_corner && bodies_.part(pair).mesh) return false;  // it isn't convex
-  // Out of the face, in the frame of the solid whose corner it is.
+  if (own_corner && bodies_.part(pair).mesh) return false;  // a mesh isn't convex
+  // The normal out of the face, in the frame of the solid that has the corner.
   const Vec3 n_O = bodies_.direction_in_object(pair.entry, corner.touch.normal);
   const Vec3 n = own_corner ? Vec3(at_.R.transpose() * corner.touch.normal) : Vec3(-n_O);
   const Solid& solid = own_corner ? bodies_.part(pair).solid : *other;
@@ -152,8 +160,9 @@ bool DeeperTouches::leans_into(const Found& corner) const noexcept {
   return false;
 }
 
-// Whether one face of a closed mesh is all before another one's plane, as beside a valley: so is the foot on it then,
-// though on the valley's line rounding may say otherwise. Both hold the point.
+// Whether the face of the pair `one` lies completely in front of the plane of the other pair's face, as beside a valley
+// of a closed mesh. A foot on the first face then is in front of that plane, too, even if on the valley's line rounding
+// says otherwise. So both faces hold the point.
 bool DeeperTouches::rises_from(const Pair& one, const Pair& other) const noexcept {
   const RigidEntry& entry = bodies_.entry(one);
   const bool of_tool = one.kind == PairKind::face_point;
@@ -170,8 +179,9 @@ bool DeeperTouches::rises_from(const Pair& one, const Pair& other) const noexcep
   return low > -kGap_m && high > kGap_m;
 }
 
-// A corner that a step takes over an edge is behind the faces on both sides of it, and may be less deep under the one
-// that it can't lie on.
+// Drops touches of corners with faces into which the corner's solid leans, if a deeper touch holds the corner. (If a
+// step takes a corner over an edge, the corner is behind the faces on both sides of the edge. It may be less deep under
+// the face on which it can't lie.)
 void DeeperTouches::drop_leaning_corners() noexcept {
   auto& found = touches_.found;
   for (std::size_t i = 0; i < touches_.count; ++i) {
@@ -199,12 +209,13 @@ bool DeeperTouches::holds_nothing(const Found& deep) const noexcept {
   return std::any_of(all.begin(), all.end(), holds_it);
 }
 
-// Whether another touch of the same point, less deep, holds it instead.
+// Whether the touch `other` of the same point is less deep and holds the point instead of the touch `deep`.
 bool DeeperTouches::is_held_instead(const Found& deep, const Found& other) const noexcept {
   const Pair& pair = pair_of(deep);
   if (other.touch.gap < deep.touch.gap || !same_point(pair, pair_of(other))) return false;
   if (pair.kind == PairKind::point_face && bodies_.entry(pair).mesh() != nullptr) {
-    // A face of an open mesh may hold the point from behind: only one that the point went through counts here.
+    // A face of an open mesh may hold the point from its other side. So only a face that the point went through counts
+    // here.
     if (bodies_.entry(pair).held == 0.0 && !(other.touch.gap < 0.0)) return false;
     return is_behind(deep, other, false) && !rises_from(pair, pair_of(other));
   }

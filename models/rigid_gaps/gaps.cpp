@@ -6,9 +6,10 @@
 namespace proxarm::models {
 namespace {
 
-// How far in front of a mesh's faces its surface is held: a face has no inside from which a tool could be brought back,
-// so rounding must not take a tool in contact through it. Coordinates below a metre are rounded by 1e-16 m, and what is
-// left of the iteration is as small; this is a thousand times that, and a tenth of what a gap may be short of.
+// Gaps of a mesh are reduced by this, so that the tool rests this far in front of the faces. A face has no inside from
+// which a tool could be brought back, so rounding must not take a touching tool through the face. Coordinates below a
+// metre are rounded by 1e-16 m, and the iteration's remaining error is as small. This is a thousand times as large, and
+// a tenth of kGap_m.
 constexpr double kLift_m = 1e-13;
 
 Solid::Rim rim_at(const Solid::Rim& rim, const View& at) noexcept {
@@ -57,7 +58,7 @@ int Gaps::evaluate_field(const Pair& pair, const View& at, Places& out) const no
   return count;
 }
 
-// Pairs that touch at one place at most.
+// Returns the touch of a pair that touches at one place at most.
 std::optional<Touch> Gaps::evaluate_one(const Pair& pair, const View& at, double beside) const noexcept {
   const Solid& own = bodies_->part(pair).solid;
   const double radii = own.radius + radius_of(bodies_->entry(pair).solid());
@@ -98,7 +99,8 @@ std::optional<Touch> Gaps::point_face(const Pair& pair, const View& at, double b
   const TriangleMesh::Face& face = face_of(*mesh, pair.other);
   const double height = side * TriangleMesh::height(face, p);
   if (bodies_->entry(pair).held == 0.0 && own.radius == 0.0 && height < 0.0) {
-    // A point that went through the face is held, wherever it is now. One that came around is held by another face.
+    // If the point went through this face, the face holds the point wherever the point is now. If the point came
+    // around, another face holds it.
     if (!sides_->went_through(*bodies_, pair, p)) return {};
     return Touch{p, side * face.normal, height};
   }
@@ -135,12 +137,15 @@ std::optional<Touch> Gaps::sharp_edges(const Pair& pair, const View& at, double 
   return touch_edges_sharp(edge, other, orientation, beside);
 }
 
-// A face of a closed mesh goes on beyond its valleys, inside of the body: there a point before it is before the
-// valley's other face as well, or in that. A corner in a valley that an iterate takes behind one face by some
-// nanometres has its foot on the other face, beyond the valley by as much; not to be found there, it let the tool go by
-// tenths of a millimetre, to where something else held it. So a pair that pressed in the last solution still counts as
-// far beyond as the last step went. (Next to a valley's end the body may end there, too: a step ends on a foot on the
-// face only.)
+// Returns the touch of a point with a face whose foot lies up to feet.over beyond a valley of the face. This is needed
+// for a corner of the tool in a valley of a closed mesh:
+// 1. An iterate may take the corner some nanometres behind one face of the valley. The corner's foot on the other face
+//    then lies beyond the valley by as much.
+// 2. When the touch with the other face wasn't found there, the tool yielded by tenths of a millimetre, until something
+//    else held it.
+// 3. So a pair that pressed in the last solution still counts up to as far beyond the valley as the last step of the
+//    iteration went. This is correct because the plane of a face continues beyond the valley inside the body.
+// 4. Next to a valley's end the body may end, too. So the iteration ends only if all feet lie on their faces.
 std::optional<Touch> Gaps::over_valley(const Pair& pair, const View& at, const FootReach& feet) const noexcept {
   const RigidEntry& entry = bodies_->entry(pair);
   const RigidPart& part = bodies_->part(pair);

@@ -1,4 +1,5 @@
-// Gaps of a pair of features at a pose: pure, but for the cylinder that is kept from one pair to the next.
+// Computes the gaps of a pair of features at a pose. The only state is the cylinder that is kept from one pair to the
+// next.
 #pragma once
 
 #include <array>
@@ -9,7 +10,8 @@
 
 namespace proxarm::models {
 
-// At one pose of the tool. Views lead from T to the frame of the pair's object, and touches are in that frame.
+// Computes gaps at one pose of the tool. Each View transforms from T into the frame of the pair's object, and touches
+// are in the object's frame.
 class Gaps {
  public:
   using Places = CylinderGaps::Places;
@@ -17,20 +19,22 @@ class Gaps {
   Gaps(const RigidBodies& bodies, const Sides& sides) noexcept
       : bodies_(&bodies), sides_(&sides), cylinders_(bodies, sides) {}
 
-  // The places where the two touch or may touch. Returns their number; 0 if no foot lies on the other feature.
-  // `beside`: how far beside a feature a foot may lie.
+  // Writes the places where the pair's features touch or may touch. Returns the number of places; 0 if no foot lies on
+  // the other feature. `beside`: how far beside a feature a foot may lie, m.
   [[nodiscard]] int evaluate(const Pair& pair, const View& at, double beside, Places& out) noexcept;
-  // The same for a pair that pressed in the last solution, up to `over` beyond a valley or an edge's end.
+  // Does the same for a pair that pressed in the last solution. The foot may lie up to feet.over beyond a valley or an
+  // edge's end.
   //
-  // An edge of the tool that lies on a vertex crosses one edge there or another one, as an iterate has it by
-  // nanometres. The edge that it left wasn't found, nothing held the tool there any more, and it went on by half a
-  // millimetre, to where something else held it.
+  // Reason: if an edge of the tool lies on a vertex, some nanometres between two iterates decide which of the vertex's
+  // edges it crosses. Without this function the edge that it no longer crossed wasn't found, nothing held the tool at
+  // the vertex, and the tool moved on by half a millimetre, until something else held it.
   [[nodiscard]] int evaluate_over(const Pair& pair, const View& at, const FootReach& feet, Places& out) noexcept;
-  // Whether a point that comes from behind a face of a convex solid is still before another one of its faces: then it
-  // is outside, and is not held by the face that it is deep under. Next to a tip the far side is near.
+  // Whether a point that was behind a face of a convex solid at the beginning, and still is, lies in front of another
+  // face of the solid. The point is then outside of the solid, and the first face doesn't hold it. (Next to a tip of a
+  // solid, faces of its far side are near.)
   [[nodiscard]] bool is_beyond_edge(const Pair& pair, double gap, const View& at) const noexcept;
-  // Keeps where a rim over something flat is lowest: while it lies level, that says where it would tip. Precondition:
-  // is_flat_rim(pair.kind).
+  // Keeps the direction of a rim's lowest point over a flat surface. While the rim lies level, this direction is used
+  // for its first place. Precondition: is_flat_rim(pair.kind).
   void remember_lowest(Pair& pair, const View& at) const noexcept;
 
  private:

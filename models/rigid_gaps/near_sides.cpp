@@ -7,8 +7,8 @@
 namespace proxarm::models {
 namespace {
 
-// Of sine²: 100 µrad. Beyond, rounding moves the place by next to nothing; then the place doesn't depend on the pose
-// before, so that a session continues the same from any point.
+// Bound of sine², for an angle of 100 µrad. At larger angles rounding hardly moves the place. The place then doesn't
+// depend on the pose before, so that a session can be continued identically from any cycle.
 constexpr double kAlongEachOther = 1e-8;
 
 }  // namespace
@@ -42,9 +42,10 @@ std::optional<NearSides> near_sides(const RigidBodies& bodies, const Pair& pair,
   return sides;
 }
 
-// With axes that are parallel to 10 µrad, the pose, rounded to 1e-16, tells the place to a micrometre: torques of
-// 10 µN m for 10 N, different at each pose. Within that, the place stays where the last solution has it. The gap there
-// differs from the least by rounding² / (2 D sine²), at most 1e-18 m.
+// 1. If the axes are parallel to 10 µrad, the pose, which is rounded to 1e-16, determines the place only to a
+//    micrometre. With 10 N, this error is a torque of 10 µN m that differs at each pose.
+// 2. Within this uncertainty the place stays where the last solution has it.
+// 3. The gap there differs from the smallest gap by rounding²/(2 D sine²), at most 1e-18 m.
 void stay_along_side(const RigidBodies& bodies, const Pair& pair, const ToolPose& pose, const Vec3& last_W,
                      Touch& touch) noexcept {
   const std::optional<NearSides> sides = near_sides(bodies, pair, touch, pose);

@@ -1,11 +1,13 @@
-// Two straight features of which one is round: a cylinder's side or a round edge, along another side or edge.
+// Computes how the place of contact of two straight features moves. At least one feature is round: a cylinder's side or
+// a round edge, along another side or edge.
 //
-// They touch where the axes come nearest, D apart, at s and t along them. D's second derivatives over the pose q and
-// over s and t, with u and v the axes and P across the normal:
+// The features touch where their axes come nearest: at the coordinates s and t along the unit axes u and v, at the
+// distance D. P is the projection perpendicular to the normal. The second derivatives of D with respect to the pose q,
+// s and t are:
 //
 //   D_qq = GᵀPG/D,  D_qs = [0; u × n] + GᵀPu/D,  D_qt = −GᵀPv/D,  D_ss = D_tt = 1/D,  D_st = −uᵀv/D
 //
-// If they are nearly parallel, the place goes far along them with next to no turn.
+// If the axes are nearly parallel, a very small turn moves the place far along the axes.
 #pragma once
 
 #include <optional>
@@ -16,21 +18,21 @@
 namespace proxarm::models {
 
 struct NearSides {
-  Vec3 u, v;  // unit, in W
+  Vec3 u, v;  // unit vectors along the axes, in W
   double own_radius = 0.0, D = 0.0, sine2 = 0.0;
   Mat3 P;
   Eigen::Matrix<double, 3, 6> G;      // displacement of the place on the tool's axis by a twist
   Eigen::Matrix<double, 6, 2> along;  // D_qs, D_qt
-  Eigen::Matrix2d inverse;            // of [D_ss D_st; D_st D_tt], times sine²/D
+  Eigen::Matrix2d inverse;            // inverse of [D_ss D_st; D_st D_tt], times sine²/D
 
-  // Displacement of the place along the tool's axis by a twist of the tool.
+  // Returns the displacement of the place of contact along the tool's axis by a twist of the tool, in W.
   [[nodiscard]] Vec3 way(const Twist& delta) const noexcept;
 };
 
-// Nothing if the two are parallel. Precondition: is_along_side(pair.kind).
+// Returns nullopt if the features are parallel. Precondition: is_along_side(pair.kind).
 [[nodiscard]] std::optional<NearSides> near_sides(const RigidBodies& bodies, const Pair& pair, const Touch& touch,
                                                   const ToolPose& pose) noexcept;
-// Puts a touch to where the last solution expected it, `last_W`, if the pose can't tell the place any better.
+// Moves a touch to `last_W`, where the last solution put it, if the pose doesn't determine the place more accurately.
 void stay_along_side(const RigidBodies& bodies, const Pair& pair, const ToolPose& pose, const Vec3& last_W,
                      Touch& touch) noexcept;
 

@@ -10,8 +10,8 @@
 namespace proxarm::models {
 namespace {
 
-// Cost of a pair beyond that of a pair of flat features, in units of that (15 ns): a cylinder and another body, two
-// cylinders, two rims.
+// Additional cost of a pair, in units of the cost of a pair of flat features (15 ns): for a cylinder and another body,
+// for two cylinders, for two rims.
 constexpr int kOfCylinder = 10, kOfTwoCylinders = 30, kRims = 600;
 
 int extra_cost(PairKind kind) noexcept {
@@ -32,8 +32,8 @@ void TouchSearch::find(const ToolPose& pose, double within_m) noexcept {
   drop_deeper(*bodies_, *candidates_, view(pose), *out_);
 }
 
-// Whether pairs that are far away may tell that this one holds nothing: edges that cross behind each other, or a
-// feature that is behind by more than the others are in front.
+// Whether far pairs must be looked at to decide whether this touch holds the tool. This is so for edges that cross
+// behind each other, and for features that are further behind than within_m.
 bool TouchSearch::needs_others(const Found& found) const noexcept {
   const PairKind kind = candidates_->pairs[found.pair].kind;
   return found.touch.gap < (kind == PairKind::edges ? -kGap_m : -out_->within_m);
@@ -46,8 +46,8 @@ void TouchSearch::look_at_pairs(const ToolPose& pose, double within_m) noexcept 
   const View at_W = view(pose);
   std::uint16_t entry = static_cast<std::uint16_t>(bodies_->setup().first_moving);
   for (MovingEntry& m : bodies_->moving()) m.tool = bodies_->seen_from(entry++, at_W);
-  // A feature that the tool is behind, having come through another feature, is no deeper than the tool has come since
-  // it was outside. And a foot may lie beside a feature.
+  // If the tool is behind a feature, the depth is at most the tool's motion since the sides were taken, when the tool
+  // was outside. In addition, a foot may lie beside a feature.
   const FootReach& feet = attempt_->feet;
   const double near_m = within_m == Touches::everywhere_m ? Touches::everywhere_m
                                                           : bodies_->motion_m(pose, candidates_->gathered_at) +
@@ -84,7 +84,7 @@ void TouchSearch::look_at(std::size_t index, const View& at, const MovingEntry* 
 
 void TouchSearch::add(const Touch& touch, std::size_t index, int which, const MovingEntry* on,
                       const ToolPose& pose) noexcept {
-  // No step that stays among the pairs comes further than they were gathered.
+  // A step that stays among the gathered pairs moves the tool by less than their reach.
   if (touch.gap > candidates_->gathered_reach_m) return;
   if (out_->count == Touches::most) {
     attempt_->overflow = true;

@@ -15,7 +15,7 @@ class TouchSearch {
   TouchSearch(RigidBodies& bodies, Candidates& candidates, const Sides& sides, Attempt& attempt, Touches& out) noexcept
       : bodies_(&bodies), candidates_(&candidates), sides_(&sides), attempt_(&attempt), out_(&out) {}
 
-  // All touches, or those that the tool may reach if it moves on by no more than `within_m`.
+  // Finds all touches at a pose, or only those that the tool may reach if it moves on by at most `within_m`.
   void find(const ToolPose& pose, double within_m = Touches::everywhere_m) noexcept;
 
  private:

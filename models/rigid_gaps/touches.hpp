@@ -1,4 +1,4 @@
-// The touches of all pairs at a pose.
+// Stores the touches of all pairs at a pose.
 #pragma once
 
 #include <array>
@@ -13,9 +13,9 @@ namespace proxarm::models {
 struct Found {
   Touch touch;             // in W
   std::uint16_t pair = 0;  // index in Candidates
-  std::uint8_t which = 0;  // of a pair that touches at several places
-  bool working = false;    // it is in the local problem
-  bool over = false;       // its foot is beyond a valley or an edge's end
+  std::uint8_t which = 0;  // which place of a pair that touches at several places
+  bool working = false;    // the touch is in the local problem
+  bool over = false;       // the foot lies beyond a valley or an edge's end
 };
 
 struct Touches {
@@ -27,7 +27,7 @@ struct Touches {
 
   std::array<Found, most> found;
   std::size_t count = 0;
-  double within_m = 0.0;  // they are complete as long as the tool moves on by no more than this
+  double within_m = 0.0;  // the touches are complete as long as the tool moves on by at most this
 };
 
 }  // namespace proxarm::models

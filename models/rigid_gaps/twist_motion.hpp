@@ -1,4 +1,5 @@
-// Displacement of a point of the tool by a twist (translation, rotation about the reference point): G ξ.
+// Computes the matrix G of a point of the tool: a twist ξ (translation, rotation about the reference point) displaces
+// the point by G ξ.
 #pragma once
 
 #include "models/geometry/geometry.hpp"
@@ -6,7 +7,7 @@
 
 namespace proxarm::models {
 
-// G = [I, −lever×], 3 × 6, with the lever from the reference point to the point, m.
+// Returns G = [I, −lever×], 3 × 6. `lever` leads from the reference point to the point, m.
 inline Eigen::Matrix<double, 3, 6> motion_of_point(const Vec3& lever) noexcept {
   Eigen::Matrix<double, 3, 6> G;
   G.leftCols<3>().setIdentity();

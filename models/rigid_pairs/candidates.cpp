@@ -7,7 +7,7 @@
 namespace proxarm::models {
 namespace {
 
-constexpr std::size_t kMostLeaves = 4096;  // of two meshes that are near each other
+constexpr std::size_t kMostLeaves = 4096;  // leaves of two meshes that are near each other
 
 }  // namespace
 

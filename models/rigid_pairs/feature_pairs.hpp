@@ -1,6 +1,7 @@
-// The pairs of features of a convex solid and another one, or a mesh, that may meet.
+// Finds the pairs of features that may meet: of two convex solids, or of a convex solid and a mesh.
 //
-// `add` takes the kind, the feature of the first and of the second body, and how far apart they are at least (m).
+// Each pair is passed to add(kind, feature of the first body, feature of the second body, lower bound of their distance
+// in m).
 #pragma once
 
 #include <algorithm>
@@ -17,8 +18,8 @@
 
 namespace proxarm::models {
 
-// A solid of the tool, seen from an object that is a solid. `turn`: by how much the tool may turn in the steps to come,
-// rad.
+// Finds the pairs of a solid of the tool and a solid object, in the object's frame. `turn`: by how much the tool may
+// turn in the steps to come, rad.
 template <typename Add>
 class PairsOfSolids {
  public:
@@ -45,7 +46,7 @@ class PairsOfSolids {
   void within(double distance2, PairKind kind, std::uint32_t i, std::uint32_t j) const noexcept {
     if (distance2 <= near_ * near_) add_(kind, i, j, std::sqrt(distance2) - radii_);
   }
-  // Whether the box around two points comes near another box.
+  // Whether the box around the points a and b comes near `box`.
   [[nodiscard]] bool is_near(const Bounds& box, const Vec3& a, const Vec3& b) const noexcept {
     return (a.cwiseMin(b).array() <= box.high.array() + near_).all() &&
            (a.cwiseMax(b).array() >= box.low.array() - near_).all();
@@ -109,8 +110,8 @@ class PairsOfSolids {
   Add add_;
 };
 
-// A solid near a mesh, seen from the mesh. `side`: 1 or −1, the side of its faces that is touched; 0 if both are.
-// `crowded` is asked before each triangle: true ends the search.
+// Finds the pairs of a solid and a mesh, in the mesh's frame. `side`: the side of the mesh's faces that is touched, 1
+// or −1; 0 if both sides are. `crowded` is read before each triangle; if it is true, the search ends.
 template <typename Add>
 class PairsWithMesh {
  public:
@@ -121,14 +122,14 @@ class PairsWithMesh {
   void add_all() noexcept {
     for (std::uint32_t i = 0; i < solid_.points.size(); ++i) solid_corner(i);
     if (solid_.edges.empty()) return;
-    // The normals of a body seen from inside are reversed.
+    // If a closed mesh is touched on the back of its faces, all normals are reversed.
     const Mat3 to_T = (side_ < 0.0 ? -1.0 : 1.0) * at_.R.transpose();
     for (const std::uint32_t face : close_.faces()) {
       if (crowded_) return;
       for (const std::uint32_t v : mesh_.vertices_of(face)) vertex(v, to_T, at_.to_T(mesh_.vertex(v)));
       for (const std::uint32_t e : mesh_.edges_of(face)) {
         const TriangleFeatures::Edge& edge = mesh_.edge(e);
-        // A valley of a closed mesh is touched by nothing sharp.
+        // No sharp feature can touch a valley of a closed mesh.
         const bool is_valley = side_ != 0.0 && !edge.line.open && edge.ridge != (side_ > 0.0);
         if (is_valley && !(solid_.radius > 0.0)) continue;
         edge_of_mesh(e);
@@ -163,7 +164,7 @@ class PairsWithMesh {
       return true;
     });
   }
-  // A vertex of the mesh, at y in T, with the solid's faces and edges.
+  // Adds the pairs of a vertex of the mesh, at y in T, with the solid's faces and edges.
   void vertex(std::uint32_t v, const Mat3& to_T, const Vec3& y) noexcept {
     if (!close_.beyond(y)) {
       const NormalCone cone = mesh_.cone(v).seen_by(to_T);
@@ -179,12 +180,12 @@ class PairsWithMesh {
       within(distance2_to_segment(y, edge_of(solid_, i)), PairKind::edge_point, i, v);
     });
   }
-  // An edge of the mesh with the solid's edges.
+  // Adds the pairs of an edge of the mesh with the solid's edges.
   void edge_of_mesh(std::uint32_t e) noexcept {
     const TriangleFeatures::Edge& of_mesh = mesh_.edge(e);
     const Vec3 from = at_.to_T(of_mesh.line.from), to = at_.to_T(of_mesh.line.to);
     if (close_.beyond_last(from, to)) return;
-    std::optional<EdgeLine> line;  // in T; few edges are asked for more than their ends
+    std::optional<EdgeLine> line;  // the edge in T; computed only when needed, because for most edges the ends suffice
     close_.each_crossing(from.cwiseMin(to), from.cwiseMax(to), [&](std::uint16_t i) {
       if (!line) line = edge_in_T(of_mesh.line, at_, of_mesh.ridge ? 1.0 : -1.0);
       const EdgeLine edge = edge_of(solid_, i);

@@ -1,4 +1,4 @@
-// Pairs of features of which one is a cylinder's.
+// Gathers the pairs with a feature of a cylinder.
 #include "models/rigid_cylinder/cylinder_pairs.hpp"
 #include "models/rigid_features/part_box.hpp"
 #include "models/rigid_pairs/gathering.hpp"

@@ -1,4 +1,4 @@
-// Pairs of features of a mesh of the tool and a mesh that is an object.
+// Gathers the pairs of features of a mesh of the tool and a mesh that is an object.
 #include <algorithm>
 #include <cmath>
 
@@ -10,8 +10,8 @@
 namespace proxarm::models {
 namespace {
 
-// The vertices and the edges that the faces of a pair own, against the other face and against each other: since each
-// belongs to one face, no pair comes twice.
+// Finds the pairs of features of two faces: the vertices that a face owns with the other face, and the edges that the
+// faces own with each other. Each vertex and edge has one owner, so no pair is found twice.
 class OfFaces {
  public:
   OfFaces(const TriangleFeatures& own, const TriangleFeatures& other, double held, const View& at, double near,
@@ -44,7 +44,7 @@ class OfFaces {
       if (distance2 <= near_ * near_) add(face, v, std::sqrt(distance2));
     }
   }
-  // A valley is touched by nothing sharp.
+  // Valleys are skipped: no sharp feature can touch a valley.
   template <typename Add>
   void edges(std::uint32_t face, std::uint32_t other_face, Add add) const noexcept {
     for (const std::uint32_t i : own_->edges_of(face)) {
@@ -72,9 +72,9 @@ class OfFaces {
 
 }  // namespace
 
-// Lists the leaves of all meshes that stand still. Listing twice as many costs less than listing them again in the next
-// step. So they are listed as far around as some hundreds of them are; if there is no room for that, as far as pairs
-// are gathered now.
+// Lists the leaves of all meshes that can't move. Listing twice as many leaves costs less than listing the leaves again
+// in the next step. So the reach of the list is chosen such that the list has some hundreds of leaves. If there is no
+// room for these, the reach of the list is the reach of the present pairs.
 void Gathering::list_leaves(const ToolPose& pose, double reach) noexcept {
   constexpr std::size_t few = 384, many = 640;
   constexpr double furthest = 8.0;

@@ -10,14 +10,14 @@
 namespace proxarm::models {
 namespace {
 
-// More pairs than this are worth a smaller reach: a pair costs some 15 ns at each pose that a step looks at.
+// If there are more pairs than this, the reach is reduced: a pair costs some 15 ns at each pose of a step.
 constexpr std::size_t kFewPairs = 192;
-// And more triangles than this: a triangle costs some 100 ns whenever pairs are gathered.
+// The same for triangles: a triangle costs some 100 ns whenever pairs are gathered.
 constexpr std::size_t kFewFaces = 256;
-// A length is reduced by this share so that it doesn't grow when it is rounded to a float.
+// A length is reduced by this share, so that rounding to a float doesn't make it larger than the length was.
 constexpr double kOfFloats = std::numeric_limits<float>::epsilon();
 
-// The kind of a pair whose features have changed places.
+// Returns the kind of a pair after its two features were exchanged.
 PairKind other_way_round(PairKind kind) noexcept {
   switch (kind) {
     case PairKind::point_face:
@@ -35,10 +35,13 @@ PairKind other_way_round(PairKind kind) noexcept {
 
 }  // namespace
 
-// Among many triangles pairs are gathered only as far as this step needs, since each pair costs in every step, and each
-// triangle in every gathering. That is one and a half times the step's way, in three parts of a quarter of the reach:
-// in two parts, of three times its way, the slowest steps of a hull or a mesh took nearly twice as long. If there isn't
-// room even for those, the step is taken in parts that need less.
+// If many triangles are near, the reach of the pairs is only as large as this step needs, because each pair costs time
+// in every step, and each triangle in every gathering:
+// 1. The smallest reach is 1.5 times the motion of the step. The step is then taken in three parts, each at most a
+//    quarter of the reach long. (With a reach of 3 times the motion, and two parts, the slowest steps of a hull or a
+//    mesh took nearly twice as long.)
+// 2. If there isn't even room for the pairs within the smallest reach, the reach is halved further, and the step is
+//    taken in more parts.
 void Gathering::gather_for(const ToolPose& q, double far_m) noexcept {
   const RigidSetup& setup = bodies_->setup();
   const double least = 1.5 * far_m + 1e-6;
@@ -64,7 +67,8 @@ void Gathering::gather(const ToolPose& pose, double reach_m) noexcept {
   restore(kept);
 }
 
-// Whether there was room for all pairs and their triangles; otherwise it ends early.
+// Gathers the pairs within `reach`. Returns whether there was room for all pairs and triangles; if not, the search ends
+// early.
 bool Gathering::look_around(const ToolPose& pose, double reach, std::size_t pairs, std::size_t faces) noexcept {
   const RigidSetup& setup = bodies_->setup();
   pair_room_ = pairs;
@@ -85,7 +89,7 @@ bool Gathering::look_around(const ToolPose& pose, double reach, std::size_t pair
   return !out_->crowded;
 }
 
-// The sides and forces of pairs that touched are kept when pairs are gathered anew.
+// Returns the pairs that pressed, so that restore() can give them their sides and forces back after a gathering.
 Gathering::KeptPairs Gathering::pressed_pairs() const noexcept {
   KeptPairs kept;
   for (const Pair& pair : out_->all()) {
@@ -144,7 +148,7 @@ void Gathering::gather_part(std::uint16_t part, std::uint16_t entry, const View&
     return PairsWithMesh(own.solid, *mesh, e.held, at, close, out_->crowded, add_as_is).add_all();
   }
   if (!own.mesh) return PairsOfSolids(own, e, at, reach, turn, add_as_is).add_all();
-  // Seen from the tool, the object is a solid near a mesh.
+  // The tool's part is a mesh: in the tool's frame the object is a solid near this mesh.
   const View from_tool = inverse(at);
   NearFaces close(*solid, e.box, *own.mesh, 1.0, from_tool, reach, turn, face_room_);
   if (!list_triangles(part, entry, close)) return;
@@ -184,7 +188,8 @@ void Gathering::add(PairKind kind, std::uint16_t part, std::uint16_t entry, std:
   pair.apart_m = static_cast<float>(apart_m * (1.0 - kOfFloats));
 }
 
-// Keeps the triangles of an object that stands still. False: no triangle is near, or too many are.
+// Adds the near triangles to the list if the object can't move. Returns false if no triangle is near or if too many
+// are.
 bool Gathering::list_triangles(std::uint16_t part, std::uint16_t entry, const NearFaces& close) noexcept {
   out_->crowded = out_->crowded || !close.all();
   if (!close.all()) return false;

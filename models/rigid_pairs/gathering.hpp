@@ -1,5 +1,5 @@
-// Gathers the pairs of features, one of the tool and one of an object, that come within a distance of each other which
-// the steps to come won't exceed. Pairs are gathered anew only when the tool has moved that far.
+// Gathers the pairs of features, one of the tool and one of an object, whose distance is below a reach. The reach
+// covers several steps to come, so pairs needn't be gathered in each step.
 #pragma once
 
 #include "models/rigid_features/near_faces.hpp"
@@ -11,9 +11,10 @@ class Gathering {
  public:
   Gathering(RigidBodies& bodies, Candidates& out) noexcept : bodies_(&bodies), out_(&out) {}
 
-  // As far around q as steps like this one, of `far_m`, need for a while; less if there is no room for all pairs.
+  // Gathers pairs around q with a reach that suffices for several steps in which no point moves by more than `far_m`.
+  // The reach is smaller if there is no room for all pairs.
   void gather_for(const ToolPose& q, double far_m) noexcept;
-  // All pairs within `reach_m` of each other, with the tool at a pose.
+  // Gathers all pairs of features within `reach_m` of each other, with the tool at a pose.
   void gather(const ToolPose& pose, double reach_m) noexcept;
 
  private:
@@ -22,7 +23,7 @@ class Gathering {
     std::size_t count = 0;
   };
 
-  // Whether a part of the tool may reach an object, by the ball around the part.
+  // Whether the ball around a part of the tool, enlarged by `reach`, meets the box around an object.
   [[nodiscard]] static bool may_reach(const RigidPart& part, const RigidEntry& entry, const View& at,
                                       double reach) noexcept;
   bool look_around(const ToolPose& pose, double reach, std::size_t pairs = Candidates::most_pairs,
@@ -40,7 +41,7 @@ class Gathering {
   void add(PairKind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own, std::uint32_t other,
            double apart_m) noexcept;
   bool list_triangles(std::uint16_t part, std::uint16_t entry, const NearFaces& close) noexcept;
-  // Takes one more triangle into account. False: there is no room for it.
+  // Counts one more triangle. Returns false if there is no room for it.
   bool take_face(std::size_t& looked_at) noexcept;
 
   RigidBodies* bodies_;

@@ -64,9 +64,12 @@ class PlanesBetween {
 
 }  // namespace
 
-// With P the projection perpendicular to the line, c the vector from y to the rim's centre, and r the rim's radius, the
-// squared distance of the place z on the rim from the line is |P c|² + 2 r (P c)ᵀz + r² − r² (dᵀz)². Its negative,
-// divided by 2 r, is the function f of circle.hpp plus a constant, if the x axis points along (d_u, d_v).
+// The line goes through y along the unit vector d. P = I − d dᵀ is the projection perpendicular to the line, c leads
+// from y to the rim's centre, and r is the rim's radius.
+// 1. The unit vector z (in u and v) gives the place on the rim at r z from the centre. Its squared distance from the
+//    line is |P c|² + 2 r (P c)ᵀz + r² − r² (dᵀz)².
+// 2. This squared distance times −1/(2 r) is the function f of circle.hpp plus a constant, if the x axis of circle.hpp
+//    points along (d_u, d_v).
 int nearest_to_line(const Solid::Rim& rim, const Vec3& y, const Vec3& d, std::array<Vec2, 2>& out) noexcept {
   const Vec3 c = rim.centre - y, across = c - d * d.dot(c);
   const Vec2 along(d.dot(rim.u), d.dot(rim.v));

@@ -266,8 +266,9 @@ class ExactHull {
       left_of_[{from, to}] = i;
     }
     const double width = area.norm() / longest.norm();
-    // Rounding in the area vector of a narrow face may turn the normal only about the face's longest edge. So the
-    // component along this edge is removed.
+    // The exact normal is perpendicular to the face's longest edge. Rounding may give the area vector of a narrow face
+    // a component along this edge, so this component is removed. The remaining error is a turn of the normal about the
+    // longest edge.
     for (int k = 0; k < 2; ++k) area -= area.dot(longest) / longest.squaredNorm() * longest;
     normals_.push_back(area.normalized());
     if (!(width > kNeedle * size_)) needles_.emplace_back(width, i);

@@ -205,7 +205,8 @@ class Section {
                  "turn one of its axes into the space or across it, or use `dimensions: 3` with `guide: plane`");
   }
 
-  // Returns the object's layer on a section of this thickness; 0 means that the section can't have a layer.
+  // Returns the object's layer on its section. `thickness_m` is the thickness of the section; the argument 0 means that
+  // this section can't have a layer.
   [[nodiscard]] models::Layer layer_on(double thickness_m) const {
     return scenes::layer_on(
         scene_, object_, thickness_m,

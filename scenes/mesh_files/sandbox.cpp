@@ -139,7 +139,8 @@ void leave(int fd, Outcome outcome, const void* data, std::size_t size) noexcept
   ::_exit(0);
 }
 
-// Waits until the end of the child closes the pipe. False if this takes longer than `seconds`.
+// Waits until the pipe is closed, which happens when the child process ends. Returns false if this takes longer than
+// `seconds`.
 bool wait_until_closed(int fd, double seconds) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));

@@ -164,8 +164,8 @@ class Cases {
   std::vector<std::pair<std::string, std::vector<std::string>>> texts_;
 };
 
-// Returns the cases of a key that a table shows. If the key's maps may have maps of defaults, only the cases without
-// maps of defaults are shown.
+// Returns those cases of a key that are shown in a table. If the key's maps may have maps of defaults, only the cases
+// without maps of defaults are shown.
 std::vector<KeyCase> told(const KeyModel& key) {
   std::vector<KeyCase> cases = key.cases;
   if (std::erase_if(cases, [](const KeyCase& one) { return one.is_wide; }) == 0) return cases;

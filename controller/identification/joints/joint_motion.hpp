@@ -53,8 +53,8 @@ struct MotionRecord {
   [[nodiscard]] bool whole() const noexcept { return rows == static_cast<int>(motor_rad.rows()); }
 };
 
-// Returns the lines of the fast motion as multiples of the base frequency. The highest line has at least 12 cycles per
-// period.
+// Returns the lines of the fast motion as multiples of the base frequency. At least 12 controller cycles fall in one
+// period of the highest line.
 std::vector<int> fast_lines(int rows_per_period, double cycle_s);
 
 // Returns two motions for each joint, about the motors' angles `motor_rad`. Throws SetupError if a joint has no room to

@@ -81,7 +81,8 @@ Vec3 strongest_normal(const CycleRecord& record) {
 // beyond Room::most_m.
 template <typename Gap>
 double way_to_other_side(const Gap& gap_m, const Vec3& normal) {
-  // tolerance_m is for other objects that are touched.
+  // The motion along `normal` may deepen the gaps to other objects that the tool touches a little. Only a deepening of
+  // more than tolerance_m counts as blocked.
   constexpr double first_m = 1e-6, tolerance_m = 1e-7;
   constexpr int halvings = 16;
   const double begun_m = std::min(0.0, gap_m(Vec3::Zero()));
