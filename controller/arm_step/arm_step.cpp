@@ -15,46 +15,53 @@ using models::Vec3;
 
 namespace {
 
-// Share of a joint's speed for the proxy's step; the rest is for the gears' twist.
+// Share of a joint's maximum speed that the proxy's step may use; the rest is for the gears' twist.
 constexpr double speed_share = 0.95;
-// Shares of a joint's acceleration: behind the filter, for braking, and behind the filter in a reduced box.
+// Shares of a joint's maximum acceleration: behind the filter (acceleration_share), for braking (braking_share), and
+// behind the filter in a reduced box (eased_share).
 constexpr double acceleration_share = 1.0, braking_share = 0.5, eased_share = 0.9;
-// Share of the elbow's speed limit; gears add some 7 % when a hand pulls the arm along at the limit.
+// Share of the elbow's speed limit that a step may use. Gears add some 7 % when a hand pulls the arm along at the
+// limit.
 constexpr double elbow_share = 0.9;
-// Cost of a joint's step beside turning: (joint speed / its limit)² counts as this many (rad/s)². Damps turning near a
-// wrist singularity, to σ = 0.03 rad/rad.
+// Cost of a joint's step, added to the cost of turning: (joint speed / speed limit)² counts as joint_cost (rad/s)².
+// This cost damps turning near a wrist singularity, below a singular value of 0.03 rad/rad.
 constexpr double joint_cost = 1e-3;
 // Arms with fewer than six axes turn the tool as little as possible: 1 rad of turning costs as much as 10 rad of a
 // joint, as in prioritized_step.hpp.
 constexpr double few_axes_turning = 100.0;
-// Cost of turning and joint steps in the search for the nearest place, in m²/rad²: with a turning lag of a milliradian
-// the place is off by 1e-10 m.
+// Factor on the costs of turning and joint steps in the search for the nearest place, in m²/rad². With a turning lag of
+// a milliradian the found place is off by 1e-10 m.
 constexpr double beside_place = 1e-7;
-// A place within this distance is reached: a tenth of the encoders' resolution at a metre.
+// A place counts as reached within this distance, a tenth of the encoders' resolution at a metre.
 constexpr double reached_m = 1e-9;
 constexpr double place_tolerance_m = 1e-12;
-// A step outside a curved set by less than this, in m or rad, counts as inside: 1 µm/s at 1 ms.
+// A step that is outside a curved set by less than this, in m or rad, counts as inside. It is 1 µm/s at 1 ms.
 constexpr double set_tolerance = 1e-9;
-// Shortest time in which borders of turning and place are approached. Otherwise it is the longest braking time; with
-// the present braking time, joints that get faster would pass the border.
+// Lower bound of braking_s(), the time with which the borders of turning and place are approached. braking_s() is the
+// longest braking time from any speed: with the braking time from the present speed, joints that get faster would pass
+// the border.
 constexpr double approach_s = 0.1;
-// A held orientation that lags catches up with this time constant at the end; before that with this acceleration, up to
-// this share of the turning speed limit. The end of a handle, 0.1 m away, then accelerates at 0.5 m/s².
+// If the tool lags behind a held orientation, its turning accelerates at catching_rad_per_s2, up to catching_share of
+// the turning speed limit, and ends with the time constant catching_s. The end of a handle, 0.1 m from T, then
+// accelerates at 0.5 m/s².
 constexpr double catching_s = 0.1, catching_rad_per_s2 = 5.0, catching_share = 0.25;
-// A lag that one step may close: 1 µm at a metre.
+// Largest lag that one step may close; 1 µm at a metre.
 constexpr double caught_up_rad = 1e-6;
-// Growth of the tried change of a joint's step; from whole_box on, U's whole box is used.
+// Allowed change of a joint's step, in halves of its acceleration. first_ease is tried first; each next trial
+// multiplies the change by next_ease. From whole_box on, U's whole box is used.
 constexpr double first_ease = 1.0, next_ease = 4.0, whole_box = 256.0;
-// The wrist is nearly singular below this sine of its middle angle.
+// The wrist counts as nearly singular if the sine of its middle angle is smaller than this.
 constexpr double near_singular = 0.3;
 constexpr int most_rounds = 8;
-constexpr int bisections = 8;        // between braking and a step: to 0.4 % of the way
-constexpr double coming_back = 0.1;  // share of braking's distance beyond the sets of turning
-constexpr double alike = 1e-3;       // half-spaces are alike below this sine between their normals
+constexpr int bisections = 8;  // between braking and a step; the result is exact to 0.4 % of the distance between them
+// A step may leave the sets of turning by this share of the angle by which braking leaves them.
+constexpr double coming_back = 0.1;
+constexpr double alike = 1e-3;  // two half-spaces are alike if the sine between their normals is smaller
 constexpr double rounding_rad = 1e-12;
-constexpr std::size_t first_point = 2;  // first joint with a speed limit of its place; the two before hardly move
+constexpr std::size_t first_point = 2;  // the first joint whose place has a speed limit; the first two hardly move
 
-// Inverse of fastest_to_rest(): highest initial speed that stays within `most`.
+// Inverse of fastest_to_rest(): returns the highest speed at the beginning of braking with which the point's speed
+// stays below `most`.
 double fastest_start(double B, double most) noexcept {
   return B <= most ? most : std::max(0.0, 2.0 * std::sqrt(B * most) - B);
 }
@@ -126,7 +133,8 @@ void ArmStep::begin(const ArmStepStart& start) noexcept {
   if (start.held && eases_) turn_gently();
 }
 
-// A held orientation that lags is caught up like a brake approaches a wall, and speeds up only as fast as joints can.
+// Sets the orientation that this step shall reach. If the tool lags behind a held orientation, it is one on the way to
+// R_WT, so that the tool's turning accelerates no faster than joints can, and slows down towards R_WT.
 void ArmStep::aim(const Eigen::Quaterniond& R_WT) noexcept {
   start_.R_WT = aim_ = R_WT;
   asked_ = catches_up_ = false;
@@ -151,10 +159,11 @@ double ArmStep::room_rad(std::size_t i, double sign) const noexcept {
   return std::max(0.0, joints_[i].share * to_end);
 }
 
-// Accelerations bound a step that doesn't brake; ranges and speeds bound braking, too.
+// Makes the braking step and U's whole box. Ranges and speeds bound every step; accelerations bound only steps that
+// don't brake.
 void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
   const double T = period_s_;
-  double cycles = 0.0;  // braking time of the slowest joint
+  double cycles = 0.0;  // longest braking time of a joint
   for (Eigen::Index i = 0; i < step_rad_.size(); ++i) {
     const double a = joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
     cycles = std::max(cycles, std::abs(step_rad_[i]) / (braking_share * a * T * T));
@@ -175,7 +184,8 @@ void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
   }
 }
 
-// The hardest braking along the last step that the box allows: often to rest at once, since the filter follows.
+// Returns the hardest braking along the last step that U's box allows. It often stops at once, since the filter then
+// brakes the setpoints.
 JointVector ArmStep::hardest_braking() const noexcept {
   double share = 0.0;
   for (Eigen::Index i = 0; i < step_rad_.size(); ++i) {
@@ -185,16 +195,17 @@ JointVector ArmStep::hardest_braking() const noexcept {
   return (std::min(1.0, share) * step_rad_).cwiseMax(whole_.low).cwiseMin(whole_.high);
 }
 
-// If a hand turns a point tool, turning changes only as fast as joints can. One box serves for entering and leaving
-// that limit: with a smaller one for leaving, the tool oscillated between the two at 16 Hz.
+// Whether a reduced box is tried first. If a hand turns a point tool, the box makes turning change only as fast as
+// joints can. The box is equally large for steps that reach this limit and for steps that leave it: with a smaller box
+// for leaving, the tool oscillated between the two boxes at 16 Hz.
 bool ArmStep::eases() const noexcept {
   return lags_ || (start_.held ? near_wrist_singularity() : !start_.touches_turning);
 }
 
 void ArmStep::use_first_box() noexcept { use_box(eases_ ? first_ease : whole_box); }
 
-// Joints that only turn the tool keep to the reduced box while a held orientation gives way to the place. (If a hand
-// turns the tool, they may have to stop at once.)
+// Keeps joints that only turn the tool in the reduced box, even where the place needs more. Only for a held
+// orientation: if a hand turns the tool, these joints may have to stop at once.
 void ArmStep::turn_gently() noexcept {
   for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
     if (margin_.carries(i)) continue;
@@ -212,7 +223,8 @@ bool ArmStep::near_wrist_singularity() const noexcept {
   return std::abs(axis(1).cross(axis(2)).dot(axis(3))) < near_singular;
 }
 
-// The part of the box in which no joint's step changes by more than `ease` times half of its acceleration.
+// Puts the part of U's box in use in which no joint's step changes by more than `ease` times half of the joint's
+// acceleration.
 void ArmStep::use_box(double ease) noexcept {
   ease_ = ease;
   if (!(ease < whole_box)) {
@@ -234,13 +246,14 @@ bool ArmStep::Box::contains(const JointVector& u) const noexcept {
   return (u.array() >= low.array() - rounding_rad).all() && (u.array() <= high.array() + rounding_rad).all();
 }
 
-// Allowed decrease of σ in this step: as towards any border, but at least the decrease by braking.
+// Returns the allowed decrease of σ in this step: a share of σ's distance from its border, but at least the smallest
+// decrease that the joints can make.
 double ArmStep::place_bound(const PlaceMargin::Border& border) const noexcept {
   const double share = period_s_ / (period_s_ + brakes_s_);
   return std::max(std::max(0.0, share * (border.value - margin_.least())), least(-border.gradient));
 }
 
-// `u`: step to the solution of the inverse kinematics.
+// Whether U contains u, the step to the solution of the inverse kinematics.
 bool ArmStep::allows(const JointVector& u) const noexcept {
   if (!box_.contains(u)) return false;
   for (const PlaceMargin::Border& border : margin_.near()) {
@@ -249,14 +262,14 @@ bool ArmStep::allows(const JointVector& u) const noexcept {
   return !points_too_fast(u, &solution_.kinematics);
 }
 
-// While all joints brake together to rest, a point of speed V gets no faster than (V + B)²/4B, with B = t |u̇|ᵀC|u̇|
-// and t the braking time; V if B ≤ V (derived in tool_guard.hpp). Returns B.
+// Returns B = t |u̇|ᵀC|u̇|, where t is the braking time. While all joints brake together to rest, the speed of a point
+// is at most V, its speed when braking begins, if B ≤ V, and at most (V + B)²/4B otherwise (derived in tool_guard.hpp).
 double ArmStep::growth_m_per_s(const JointVector& u) const noexcept {
   const JointVector rate = u.cwiseAbs() / period_s_;
   return braking_of(slowest_to_brake(rate), rate) * rate.dot(curvature_.lazyProduct(rate));
 }
 
-// Gradient of growth_m_per_s() by u, m/s per rad.
+// Returns the gradient of growth_m_per_s() by u, m/s per rad.
 JointVector ArmStep::growth_gradient(const JointVector& u) const noexcept {
   const JointVector rate = u.cwiseAbs() / period_s_, bent = curvature_ * rate;
   const Eigen::Index slowest = slowest_to_brake(rate);
@@ -266,11 +279,12 @@ JointVector ArmStep::growth_gradient(const JointVector& u) const noexcept {
   return out;
 }
 
-// Braking time of this joint; and the joint with the longest.
+// Returns the braking time of joint i.
 double ArmStep::braking_of(Eigen::Index i, const JointVector& rad_per_s) const noexcept {
   return rad_per_s[i] / joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
 }
 
+// Returns the joint with the longest braking time.
 Eigen::Index ArmStep::slowest_to_brake(const JointVector& rad_per_s) const noexcept {
   Eigen::Index slowest = 0;
   for (Eigen::Index i = 1; i < rad_per_s.size(); ++i) {
@@ -279,8 +293,9 @@ Eigen::Index ArmStep::slowest_to_brake(const JointVector& rad_per_s) const noexc
   return slowest;
 }
 
-// A point moves by at most Σ R_i |u_i|, R_i: largest distance of T from axis i. Most steps are below the limit by this
-// bound. `known`: kinematics after the step, or null.
+// Whether T, elbow or wrist get too fast in the step u or while braking after it. `known`: kinematics after the step,
+// or null. Most steps need no kinematics: a point moves by at most Σ R_i |u_i|, where R_i is the largest distance of T
+// from axis i.
 bool ArmStep::points_too_fast(const JointVector& u, const models::ToolKinematics* known) const noexcept {
   const double B = growth_m_per_s(u), T = period_s_;
   const double tool_m_per_s = elbow_share * start_.tool_m_per_s, elbow_m_per_s = elbow_share * start_.elbow_m_per_s;
@@ -289,7 +304,7 @@ bool ArmStep::points_too_fast(const JointVector& u, const models::ToolKinematics
   models::ToolKinematics after;
   if (known == nullptr) arm_->kinematics(link_rad_ + u, after);
   const models::ToolKinematics& to = known != nullptr ? *known : after;
-  // If braking makes T no faster, the speed ball bounds it (step_limits.hpp).
+  // If braking makes T no faster, the ball of the speed limit bounds T's speed (step_limits.hpp).
   if (B > tool_m_per_s && (to.X_WT.translation() - from_.X_WT.translation()).norm() > tool_m + set_tolerance) {
     return true;
   }
@@ -317,7 +332,7 @@ bool ArmStep::contains(const Vec3& q_W) noexcept {
 bool ArmStep::cut(const Vec3& q_W, const Vec3& q_k1_W, LimitPlane<3>& out) noexcept {
   if (!linearised_) start_model();
   use_box(whole_box);
-  // J_w u = `wanted` carries the wrist to its place with the tool at q_W.
+  // A step u with J_w u = `wanted` carries the wrist to its place for a tool at q_W.
   const Vec3 here_W = model_.at.X_WT.translation() + wrist_.from_T_W;
   const auto wanted_for = [&](const Vec3& from_T_W) { return q_W + from_T_W - here_W + wrist_.J_W * model_.u; };
   Vec3 wanted = wanted_for(wrist_wanted_W_) - wrist_.by_turning_W * turn_from(model_, aim_);
@@ -358,13 +373,13 @@ void ArmStep::start_model() noexcept {
   linearised_ = true;
 }
 
-// Rotation vector from the model's orientation to R.
+// Returns the rotation vector from the model's orientation to R.
 Vec3 ArmStep::turn_from(const Model& model, const Eigen::Quaterniond& R) const noexcept {
   const Eigen::Quaterniond here = Eigen::Quaterniond(model.at.X_WT.linear()).normalized();
   return models::rotation_vector(R * here.conjugate());
 }
 
-// ½ w |J_R (u' − u) − e_R|² + ½ Σ c_i (u'_i − u_b,i)²
+// Sets H and g of the objective ½ w |J_R (u' − u) − e_R|² + ½ Σ c_i (u'_i − u_b,i)². e_R: rotation vector to aim_.
 void ArmStep::objective(const Model& model, JointMatrix& H, JointVector& g) const noexcept {
   const auto J_R = model.at.J_W.bottomRows<3>();
   const double w = inverse_->reaches_orientation() ? 1.0 : few_axes_turning;
@@ -392,17 +407,18 @@ void ArmStep::add_sets() noexcept {
   for (std::size_t k = 0; k < row_count_; ++k) add_set(rows_[k].a, rows_[k].b, rows_[k].limit);
 }
 
-// Minimum of a·u in the box.
+// Returns the minimum of a·u in U's box.
 double ArmStep::least(const JointVector& a) const noexcept {
   return (a.array() * (a.array() > 0.0).select(whole_.low, whole_.high).array()).sum();
 }
 
-// Adds a·u ≤ b, widened to what the joints can still do. Returns whether this excludes `step`. It doesn't if braking
-// leaves the set as well, or if only the curvature along the border does.
+// Adds the half-space a·u ≤ b, widened to what the joints can still do. Returns whether the widened half-space excludes
+// `step`. It may contain `step` if every step of the joints leaves a·u ≤ b, braking included, or if `step` leaves the
+// curved set only by the curvature of its border.
 bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVector& step) noexcept {
   const Row row{a, std::max(b, least(a)), limit};
   if (a.dot(step) <= row.b + set_tolerance) return false;
-  // A nearly parallel row is replaced: two of them would lose the program's digits.
+  // A nearly parallel row is replaced, since two nearly parallel rows would cost the program's result digits.
   for (std::size_t k = 0; k < row_count_; ++k) {
     if (rows_[k].limit != limit || (rows_[k].a - a).norm() > alike * a.norm()) continue;
     rows_[k] = row;
@@ -412,7 +428,7 @@ bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVe
   return true;
 }
 
-// The half-space in which this step has the most room.
+// Returns the half-space whose border is furthest from this step.
 std::size_t ArmStep::slackest_row(const JointVector& step) const noexcept {
   std::size_t slackest = 0;
   double most = 0.0;
@@ -426,7 +442,8 @@ std::size_t ArmStep::slackest_row(const JointVector& step) const noexcept {
   return slackest;
 }
 
-// The step with J u = `wanted` that turns the tool as far as U allows. False if U has none.
+// Finds the step in U with J u = `wanted` that turns the tool as near to its orientation aim_ as U allows. Returns
+// false if U contains no step with J u = `wanted`.
 bool ArmStep::solve_at(const Model& model, const Rows& J, const Vec3& wanted) noexcept {
   JointMatrix H;
   JointVector g;
@@ -442,7 +459,7 @@ bool ArmStep::solve_at(const Model& model, const Rows& J, const Vec3& wanted) no
   return program_.solve();
 }
 
-// The step with J u nearest to `wanted`.
+// Finds the step in U whose J u is nearest to `wanted`.
 bool ArmStep::solve_near(const Model& model, const Rows& J, const Vec3& wanted) noexcept {
   JointMatrix H;
   JointVector g;
@@ -453,7 +470,7 @@ bool ArmStep::solve_near(const Model& model, const Rows& J, const Vec3& wanted) 
   return program_.solve();
 }
 
-// Rotation vector by which u turns the tool beyond the sets of turning.
+// Returns the rotation vector by which u turns the tool beyond the sets of turning.
 Vec3 ArmStep::turned_beyond(const Model& model, const JointVector& u) const noexcept {
   if (!inverse_->reaches_orientation()) return Vec3::Zero();
   const auto J_R = model.at.J_W.bottomRows<3>();
@@ -465,7 +482,7 @@ Vec3 ArmStep::turned_beyond(const Model& model, const JointVector& u) const noex
   return models::rotation_vector(to * within.conjugate());
 }
 
-// Adds half-spaces for the curved sets that u leaves. Returns whether it leaves any.
+// Adds half-spaces for the curved sets that u leaves. Returns whether an added half-space excludes u.
 bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexcept {
   bool leaves = false;
   const Vec3 beyond = turned_beyond(model, u);
@@ -477,9 +494,10 @@ bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexce
   return (points_too_fast(u, nullptr) && limit_points(model, u)) || leaves;
 }
 
-// Half-spaces approach a curved set in ever smaller steps. A remaining excess is removed by moving towards braking,
-// which leaves no set that can be kept. If braking also leaves the set of turning, a step that returns into it is
-// accepted: otherwise a tool slightly beyond its limit would stay there.
+// Returns a step between braking and u that leaves no curved set. Reason: a solution with half-spaces may still leave a
+// curved set a little, since half-spaces approach the set in ever smaller steps; braking leaves no set that the joints
+// can keep. If braking leaves the sets of turning, a step that almost returns into them is accepted: otherwise a tool
+// slightly beyond its limit would stay there.
 JointVector ArmStep::taken_back(const Model& model, const JointVector& u) const noexcept {
   const double most = std::max(set_tolerance, coming_back * turned_beyond(model, brakes_).norm());
   const auto leaves = [&](const JointVector& tried) {
@@ -494,7 +512,8 @@ JointVector ArmStep::taken_back(const Model& model, const JointVector& u) const 
   return brakes_ + kept * (u - brakes_);
 }
 
-// B changes with u, so the half-space is that of the linearised (V + B)²/4B, with
+// Adds half-spaces for the points that get too fast in the step u or while braking after it. Returns whether an added
+// half-space excludes u. If B > V, a half-space bounds (V + B)²/4B, linearised at u, since B changes with u:
 //   ∂/∂V = (V + B)/2B,   ∂/∂B = (B² − V²)/4B²,   ∂B/∂u̇ = 2t C|u̇| sgn u̇ + |u̇|ᵀC|u̇| ∂t/∂u̇
 bool ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
   models::ToolKinematics at;
@@ -503,7 +522,7 @@ bool ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
   const double B = growth_m_per_s(u), T = period_s_;
   const JointVector B_u = growth_gradient(u);
   bool leaves = false;
-  // A joint's origin moves only with the joints before it.
+  // Only the joints before a joint move its origin.
   const auto limit = [&](const Vec3& from_W, const Vec3& to_W, std::size_t joints, double most_m_per_s) {
     const Vec3 way = to_W - from_W;
     const double length = way.norm(), V = length / T, beyond = fastest_to_rest(V, B) - most_m_per_s;
@@ -560,7 +579,8 @@ ArmStep::Outcome ArmStep::go(const Vec3& q_W, const Eigen::Quaterniond& R_WT) no
   return catches_up_ ? Outcome::lags : Outcome::reached;
 }
 
-// Newton's method on the place; each program uses the tool linearised at the last solution.
+// Finds the step by Newton's method on the place. Each quadratic program uses the kinematics linearised at the last
+// solution.
 ArmStep::Outcome ArmStep::go_limited(const Vec3& x_W) noexcept {
   if (!linearised_) start_model();
   use_box(first_ease);

@@ -14,17 +14,20 @@ using models::Vec3;
 namespace {
 
 constexpr double least_m_per_rad = 0.05, share_of_start = 0.5;
-// The gradient is computed for σ below the least one plus this. A tool at 0.5 m/s takes 0.2 s from there.
+// The gradient of a σ is computed if σ is below the border plus this. A tool at 0.5 m/s takes 0.2 s from such a σ to
+// the border.
 constexpr double near_m_per_rad = 0.1;
-// Finite differences of J_w, which is exact to 1e-16 m: truncation and rounding each add 1e-6 of ∂J_w/∂c.
+// Change of an angle for finite differences of J_w. J_w is exact to 1e-16 m, so truncation and rounding each change
+// ∂J_w/∂c by a millionth.
 constexpr double nudge_rad = 1e-6;
-// Axes within this distance of the wrist's origin meet there: digits of a right angle in a URDF are off by 1e-9 rad.
+// Axes count as meeting in the wrist if they pass it within this distance. A right angle is rounded in a URDF, by
+// 1e-9 rad.
 constexpr double meeting_m = 1e-6;
-// Damping of the inverse that turns the tool back, rad/rad: for a smaller sine of the wrist's middle angle, the tool
-// turns later. With 0.03, σ changed so fast there that its border moved the tool against the hand.
+// Damping of J_R3⁺, rad/rad: if the sine of the wrist's middle angle is smaller than this, the tool turns later. With
+// 0.03, σ changed so fast at small angles that its border moved the tool against the hand.
 constexpr double damped_at = 0.3;
 
-// Jacobian of the tool's point at from_T_W from T.
+// Returns the Jacobian of the tool's point whose position from T is from_T_W.
 PlaceMargin::Columns jacobian_of(const models::ToolKinematics& at, const Vec3& from_T_W) noexcept {
   PlaceMargin::Columns J = at.J_W.topRows<3>();
   for (Eigen::Index i = 0; i < J.cols(); ++i) J.col(i) += Vec3(at.J_W.col(i).tail<3>()).cross(from_T_W);
@@ -87,7 +90,8 @@ void PlaceMargin::hold_orientation(const models::ToolKinematics& at, Wrist& wris
 }
 
 PlaceMargin::Singular PlaceMargin::singular(const Columns& J) const noexcept {
-  // Directions in which T can't move have J = 0; a large value there leaves the smallest of the others.
+  // In directions in which T can't move, J = 0. A large value is added in these directions, so that the smallest values
+  // are those of the other directions.
   models::Mat6 squared = models::Mat6::Identity() * 1e6;
   squared.topLeftCorner<3, 3>() = J * J.transpose();
   for (int k = space_.dimensions; k < 3; ++k) {
@@ -97,7 +101,8 @@ PlaceMargin::Singular PlaceMargin::singular(const Columns& J) const noexcept {
   return {eigen.values.head<3>().cwiseMax(0.0).cwiseSqrt(), eigen.vectors.topLeftCorner<3, 3>()};
 }
 
-// For squares λ₁ ≤ λ₂ ≤ λ₃ of singular values: λ₁ ≥ λ₁λ₂λ₃ / ((λ₁ + λ₂ + λ₃)/2)².
+// Whether σ is surely far from the border. The squares λ₁ ≤ λ₂ ≤ λ₃ of the singular values satisfy
+//   λ₁ ≥ λ₁λ₂λ₃ / ((λ₁ + λ₂ + λ₃)/2)²
 bool PlaceMargin::surely_clear(const Columns& J) const noexcept {
   const Mat3 squared = J * J.transpose();
   const double half_sum = 0.5 * squared.trace();
@@ -119,8 +124,8 @@ void PlaceMargin::go_to(const JointVector& c_rad, const models::ToolKinematics& 
   measure(c_rad, wrist(at).J_W);
 }
 
-// dσ = leftᵀ dJ right, right = Jᵀ left / σ. The first joint moves the arm as a whole and doesn't change σ; nor do those
-// from the wrist on, if their axes meet.
+// Computes every σ near the border, and its gradient: dσ = leftᵀ dJ right, right = Jᵀ left / σ. Two kinds of joints
+// don't change σ: the first joint, which moves the arm as a whole, and the joints from the wrist on if their axes meet.
 void PlaceMargin::measure(const JointVector& c_rad, const Columns& J) noexcept {
   const Singular now = singular(J);
   from_rad_ = c_rad;

@@ -1,24 +1,25 @@
-// Measures how far the arm is from poses in which the tool can't move in every direction: stretched or folded (elbow),
-// or with the wrist above the first axis (shoulder).
+// Measures how far the arm is from poses in which the tool can't move in every direction: the arm is stretched or
+// folded (elbow), or the wrist is above the first axis (shoulder).
 //
 //   σ(c) = a singular value of J_w(c), in m/rad
-// J_w: Jacobian of the wrist's position by the joints that carry it. With the orientation held, T moves with the wrist,
-// so the smallest σ is the tool's motion per joint angle in its slowest direction. Each σ has its own border: near two
-// singularities at once, both must end the step, and which σ is smallest may change between steps. The wrist is the
-// origin of the last joint but one; the last three joints turn the tool about it. For arms with fewer than six axes,
-// J_w is T's Jacobian in the directions in which T can move (tool_space.hpp).
+// J_w: Jacobian of the wrist's position by the joints that carry the wrist. With a held orientation, T moves with the
+// wrist, so the smallest σ is the tool's motion per joint angle in its slowest direction. Each σ has its own border:
+// near two singularities at once, both borders must bound the step, and the smallest σ may be another one in the next
+// step. The wrist is the origin of the last joint but one; the last three joints turn the tool about the wrist. For
+// arms with fewer than six axes, J_w is T's Jacobian in the directions in which T can move (tool_space.hpp).
 //
-// If the last three axes don't meet in a point, as in many light arms, turning the tool back also moves it. To hold the
-// orientation, the last three joints turn by −J_R⁺ times the turning by the others, so
+// If the last three axes don't meet in a point, as in many light arms, these joints also move the wrist when they turn
+// the tool. To hold the orientation, they turn by −J_R3⁺ times the rotation by the other joints, so
 //   J_w = J_c − P J_Rc,   P = J_3 J_R3⁺
-// J: of the tool's point at the wrist's origin; c: the joints that carry it, 3: the last three, R: rotations; J_R3⁺:
-// the inverse, damped to σ = 0.3 rad/rad.
+// J: Jacobian of the tool's point at the wrist's origin. Index c: columns of the joints that carry the wrist. Index 3:
+// columns of the last three joints. Index R: rows of the rotation. J_R3⁺: inverse of J_R3, damped below a singular
+// value of 0.3 rad/rad.
 //
-// A singularity of the wrist itself doesn't affect σ: there, turning lags and the place is kept (arm_step.hpp).
+// A singularity of the wrist doesn't affect σ: near it, turning lags and the place is kept (arm_step.hpp).
 //
-// σ changes by at most |ΔJ_w| ≤ Σ_k w_k |Δc_k|, w_k² = Σ_j C_kj² (C: Arm::path_curvature()), so it isn't computed in
-// each step far from the border. With P, which may change fast, a lower bound from a determinant is. No allocation,
-// lock or throw after construction.
+// σ changes by at most |ΔJ_w| ≤ Σ_k w_k |Δc_k|, w_k² = Σ_j C_kj² (C: Arm::path_curvature()). So far from the border σ
+// isn't computed in each step. If the last three axes don't meet, P may change fast, and a lower bound of σ, from a
+// determinant, is computed in each step. Nothing allocates, locks or throws after construction.
 #pragma once
 
 #include <array>
@@ -34,37 +35,36 @@ class PlaceMargin {
   // Precondition: `arm` outlives this object.
   PlaceMargin(const models::Arm& arm, const models::ToolSpace& space);
 
-  // Smallest σ that a step may lead to: 0.05 m/rad (elbow of the default cell 8° from straight, 4 mm of its reach), or
-  // half of σ at the start pose if that is less.
+  // The border, the smallest σ to which a step may lead: 0.05 m/rad, or half of σ at the start pose if this half is
+  // smaller. In the default cell, the elbow is then 8° from straight, 4 mm before the end of its reach.
   [[nodiscard]] double least() const noexcept { return least_; }
 
   // Moves from the last link angles to c_rad. Precondition: `at` is the kinematics at c_rad.
   void go_to(const models::JointVector& c_rad, const models::ToolKinematics& at) noexcept;
   struct Border {
     double value = 0.0;            // σ, m/rad
-    models::JointVector gradient;  // of σ by the joints, m/rad²
+    models::JointVector gradient;  // gradient of σ by the joints, m/rad²
   };
-  // The σ so near their border that a step might matter, smallest first.
+  // The σ that are near enough to the border to bound a step, smallest first.
   [[nodiscard]] std::span<const Border> near() const noexcept { return {borders_.data(), near_}; }
 
-  // Whether this drive's joint carries the wrist; the others only turn the tool about it.
+  // Whether this drive's joint carries the wrist. The other joints only turn the tool about the wrist.
   [[nodiscard]] bool carries(Eigen::Index joint) const noexcept { return carries_[static_cast<std::size_t>(joint)]; }
-  // J_w and the wrist's position.
   using Columns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, models::max_axes>;
   struct Wrist {
-    Columns J_W;
-    models::Vec3 from_T_W;  // from T to the wrist
-    models::Mat3 by_turning_W =
-        models::Mat3::Zero();  // P: motion of the wrist when the last three joints turn the tool
+    Columns J_W;            // J_w
+    models::Vec3 from_T_W;  // position of the wrist from T
+    // P: gives the wrist's motion, if multiplied by the rotation by which the last three joints turn the tool.
+    models::Mat3 by_turning_W = models::Mat3::Zero();
   };
   [[nodiscard]] Wrist wrist(const models::ToolKinematics& at) const noexcept;
-  // The smallest σ there, in m/rad; keeps no state.
+  // Returns the smallest σ at these kinematics, in m/rad. Changes no state.
   [[nodiscard]] double smallest(const models::ToolKinematics& at) const noexcept {
     return singular(wrist(at).J_W).value[0];
   }
 
  private:
-  // Singular values of J, smallest first, and their left vectors.
+  // Singular values of J, smallest first, and their left singular vectors.
   struct Singular {
     models::Vec3 value;
     models::Mat3 left;
@@ -80,8 +80,8 @@ class PlaceMargin {
   models::ToolSpace space_;
   models::JointVector weights_;  // w
   std::array<bool, models::max_axes> carries_{};
-  std::size_t wrist_ = 0;  // index of the joint whose origin is the wrist; axes(): T
-  bool apart_ = false;     // the last three axes don't meet there
+  std::size_t wrist_ = 0;  // index of the joint whose origin is the wrist; axes(): T is used as the wrist
+  bool apart_ = false;     // the last three axes don't meet in the wrist
   double least_ = 0.0, near_below_ = 0.0;
   models::JointVector from_rad_;
   double clear_ = -1.0;

@@ -5,6 +5,7 @@
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/session_checks.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/trials/trial_run.hpp"
 #include "models/base/setup_error.hpp"

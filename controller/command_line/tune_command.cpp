@@ -9,6 +9,8 @@
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/session_checks.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/trials/inertia_advice.hpp"
 #include "controller/command_line/trials/mass_advice.hpp"

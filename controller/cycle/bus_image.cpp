@@ -44,7 +44,7 @@ void BusImage::begin(std::int64_t t_k_ns) noexcept {
   for (DriveOnBus& axis : parts_.drives) axis.drive.on_sync(t_k_ns);
 }
 
-// Receives frames from before t_k together with those of this cycle.
+// Receives the frames that arrived before t_k together with the frames of this cycle.
 void BusImage::receive_until(std::int64_t deadline_ns, FrameListener& listener) noexcept {
   if (everything_received()) receive_all(listener);
   while (!everything_received() && parts_.network.wait_for_frame(deadline_ns)) receive_all(listener);
@@ -66,11 +66,12 @@ void BusImage::deliver(std::size_t bus, const fieldbus::TimedFrame& received, Fr
   }
   if (listener.on_frame(bus, frame)) return;
   if (parts_.enabling && parts_.enabling->on_frame(bus, frame, received.time_ns)) return;
-  // A bus doesn't loop own frames back, so another node has sent this one.
+  // A bus doesn't return the controller's frames, so another node has sent this frame.
   if (is_masters_own(bus, frame)) alarm_.raise(Fault::second_master, static_cast<std::int32_t>(bus), frame.id);
 }
 
-// Only the controller may send NMT commands, SYNC, its own heartbeat and setpoints for its drives.
+// Whether only the controller may send this frame: NMT commands, SYNC, the controller's heartbeat, and setpoints for
+// its drives.
 bool BusImage::is_masters_own(std::size_t bus, const fieldbus::CanFrame& frame) const noexcept {
   if (frame.extended || frame.remote || frame.error) return false;
   const bool drives_here = std::any_of(parts_.drive_buses.begin(), parts_.drive_buses.end(),
@@ -126,7 +127,8 @@ void BusImage::send(std::size_t bus, const fieldbus::CanFrame& frame) noexcept {
 
 void BusImage::hand_over() noexcept { hand_over(0, outboxes_.size()); }
 
-// Reads the clock only twice for all buses: without a vDSO each reading is a system call.
+// Passes the queued frames of these buses to the interfaces. Reads the clock only twice for all buses, since each
+// reading is a system call if there is no vDSO.
 void BusImage::hand_over(std::size_t first_bus, std::size_t end_bus) noexcept {
   const std::int64_t now_ns = parts_.network.now_ns();
   for (std::size_t bus = first_bus; bus < end_bus; ++bus) {

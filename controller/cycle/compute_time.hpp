@@ -1,4 +1,4 @@
-// Measures computing time from construction on, without the time spent waiting for frames.
+// Measures the computing time since construction, without the time spent waiting for frames.
 #pragma once
 
 #include <chrono>

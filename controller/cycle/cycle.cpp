@@ -11,7 +11,8 @@ bool renders_torques(const CycleParts& parts) noexcept {
   return std::holds_alternative<std::unique_ptr<TorqueRendering>>(parts.rendering);
 }
 
-// A joint that a fault stopped at its range's end is beyond it by at most the deviation that drive_deviates allows.
+// A joint that a fault has stopped at the end of its range is beyond this end by at most the deviation that the fault
+// drive_deviates allows.
 ReadingBounds reading_bounds(const CycleParts& parts, const description::CellLimits& limits) noexcept {
   return {.max_force_N = limits.max_force_N,
           .max_bias_drift_N = parts.supervision.max_bias_drift_N,
@@ -20,7 +21,7 @@ ReadingBounds reading_bounds(const CycleParts& parts, const description::CellLim
           .handle_S = parts.compensation.tool().handle_S};
 }
 
-// A hand drives back a device with torques at any speed, so its tool speed isn't monitored.
+// If the drives take torques, a hand may move the device at any speed, so the tool's speed isn't monitored.
 std::optional<ToolMonitor> tool_monitor(const CycleParts& parts, const SessionSettings& settings,
                                         const description::CellLimits& limits) {
   if (renders_torques(parts)) return {};
@@ -41,7 +42,8 @@ std::optional<StandstillMonitor> standstill_monitor(const CycleParts& parts, con
   return StandstillMonitor(parts.arm->axes(), limits.following_error_rad);
 }
 
-// With torques, an arm can neither hold nor be slowed: these reactions become stops.
+// Returns the reactions to faults. If the drives take torques, the arm can't be held or slowed, so the reactions `hold`
+// and `slow` become stops.
 Reactions reactions_for(const CycleParts& parts) {
   Reactions reactions = reactions_of(parts.supervision);
   if (!renders_torques(parts)) return reactions;
@@ -52,7 +54,7 @@ Reactions reactions_for(const CycleParts& parts) {
   return reactions;
 }
 
-// Why this session keeps its timestep, or nullptr if it can change.
+// Returns the reason why this session keeps its timestep, or nullptr if the timestep can change.
 const char* fixed_timestep(const CycleParts& parts) noexcept {
   if (renders_torques(parts)) return "the impedance type's torques are made for one timestep";
   if (!parts.modbus_lines.empty()) return "what is on a Modbus line keeps the timestep of the start";
@@ -127,8 +129,8 @@ void Cycle::judge(std::int64_t t_k_ns) noexcept {
   enter(supervisor_.phase(), t_k_ns);
 }
 
-// If the phase changes during the choice of setpoints, the new phase acts in the same cycle, so a fault found here
-// stops the arm at once; unless this cycle's setpoints exist already.
+// If the phase changes while setpoints are chosen, the new phase acts in this cycle, too, unless this cycle's setpoints
+// have been made. So a fault that is found while setpoints are chosen stops the arm at once.
 void Cycle::choose_setpoints(std::int64_t t_k_ns) noexcept {
   act(t_k_ns);
   if (supervisor_.phase() == state_.entered_phase) return;
@@ -190,13 +192,13 @@ void Cycle::end_cycle(const ComputeTime& timed) noexcept {
                 .timesteps_answered = timestep_.settled(),
                 .asked_timesteps = requests_.timesteps.taken_from_thread(),
                 .tool = measurement_.tool_evidence(tool_.wanted(), settings_)});
-  recorder_.record().compute_ns = timed.ns();  // without copying the record into its rings
+  recorder_.record().compute_ns = timed.ns();  // doesn't include the copying of the record into the rings
   recorder_.finish();
   ++state_.cycle;
 }
 
-// Precondition: the arm stands. Setpoints, measurements and proxy stay. Recomputes values that depend on T, and
-// converts times counted in cycles.
+// Changes the timestep: recomputes values that depend on T, and converts times that are counted in cycles. Setpoints,
+// measurements and proxy don't change. Precondition: the arm stands.
 void Cycle::apply(const Timestep& timestep) noexcept {
   const double ratio = settings_.period_s / timestep.period_s;
   settings_.max_missed_samples = timestep.max_missed_samples;
@@ -208,14 +210,14 @@ void Cycle::apply(const Timestep& timestep) noexcept {
   look_ahead(timestep.horizon_s);
 }
 
-// A negative horizon keeps the present one.
+// Sets the lookahead's horizon. If horizon_s is negative, the present horizon stays.
 void Cycle::look_ahead(double horizon_s) noexcept {
   if (!(horizon_s >= 0.0)) return;
   settings_.horizon_s = horizon_s;
   motion_->set({.parameter = Parameter::lookahead, .value = horizon_s});
 }
 
-// The timestep comes first, since everything after depends on it.
+// The timestep is archived first, since everything archived after it depends on it.
 void Cycle::archive(fieldbus::StateArchive& state) noexcept {
   Timestep now = timestep_of(settings_);
   archive_fields(state, now);

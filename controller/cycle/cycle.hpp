@@ -1,15 +1,16 @@
-// One period of a session. Hardware, vcan, in-process simulation and tests run the same lines; only bus and clock
+// Runs the periods of a session. Hardware, vcan, in-process simulation and tests run this code; only bus and clock
 // differ.
 //
-//   t_k        SYNC on every drive bus, then the sensor's poll
-//   … 0.45 T   receive, until every drive's TPDO and the sensor's sample are in
-//   then       measure, judge, choose the setpoints by the phase, send them (with the heartbeat if due), record
+//   at t_k              Send SYNC on every drive bus, then the sensor's poll.
+//   until t_k + 0.45 T  Receive, until every drive's TPDO and the sensor's sample have arrived.
+//   after that          Measure, judge, choose the setpoints by the phase, send them (and the heartbeat if it is due),
+//                       record.
 //
-// The drives latch the setpoints at SYNC k+1 and, interpolating over the period, reach them at k+2.
+// The drives latch the setpoints at SYNC k+1, interpolate over the period, and reach the setpoints at SYNC k+2.
 //
-// run_cycle() neither allocates, locks, throws nor prints; all objects are built before. Precondition: one thread calls
-// it. Each stage is a separate part (BusImage, Measurement, FaultMonitor, Motion, TimestepChange, CycleRecorder). Cycle
-// connects them and decides by the session's phase.
+// run_cycle() doesn't allocate, lock, throw or print; all objects are built before the first cycle. Precondition: only
+// one thread calls run_cycle(). Each stage is a separate part (BusImage, Measurement, FaultMonitor, Motion,
+// TimestepChange, CycleRecorder). Cycle connects these parts, and acts by the session's phase.
 #pragma once
 
 #include <array>
@@ -38,7 +39,7 @@ namespace proxarm::controller {
 
 class Cycle {
  public:
-  // record_capacity: number of records in the ring until they are popped.
+  // record_capacity: largest number of records that wait in the ring until the writing thread pops them.
   Cycle(CycleParts parts, const SessionSettings& settings, const description::CellLimits& limits,
         std::size_t record_capacity);
   Cycle(const Cycle&) = delete;
@@ -52,37 +53,37 @@ class Cycle {
   void request_stop() noexcept { status_.request_stop(); }
   [[nodiscard]] bool stop_requested() const noexcept { return status_.stop_requested(); }
 
-  // ---- one thread for each ring: one that makes requests, one that takes the records
-  // Parameter changes, already checked. Rendering and holds take one per cycle.
+  // ---- one thread for each ring: a thread that makes requests, a thread that takes the records
+  // Requests for checked changes of parameters. In rendering and in holds, a cycle takes at most one request.
   [[nodiscard]] Requests<Change>& changes() noexcept { return requests_.changes; }
-  // Changes of the timestep, only if all drives are on CAN and take positions. The arm stops, the drives get the new
-  // timestep, and rendering continues. A request waits until the arm is rendering or in a hold.
+  // Requests for another timestep. Precondition: all drives are on CAN and take positions. The arm stops, the drives
+  // get the new timestep, and rendering continues. A request waits until the arm is rendering or in a hold.
   [[nodiscard]] Requests<Timestep>& timesteps() noexcept { return requests_.timesteps; }
-  // Commands are taken in any phase, and dropped if they don't apply to it; CycleStatus::refusal() tells this in
-  // advance.
+  // Commands. They are taken in every phase, and dropped if they don't apply to it; CycleStatus::refusal() returns
+  // in advance whether a command applies.
   [[nodiscard]] Requests<Command>& commands() noexcept { return requests_.commands; }
-  // Records for the thread that writes files.
+  // The records, for the thread that writes files.
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return recorder_.records(); }
 
   // ---- the loop's owner, between cycles
-  // Precondition: no cycle has run. All later cycles also write their inputs and outputs to `box`.
+  // Makes all cycles write their inputs and outputs to `box`, too. Precondition: no cycle has run.
   void write_to(CycleBox& box) noexcept { recorder_.write_to(box); }
-  // Reports to the next cycle how many consecutive cycles were late. was_waited_for: the last one was late by the wall
-  // clock, and simulated time waited for it; this is only recorded.
+  // Reports to the next cycle how many consecutive cycles were late. was_waited_for: the last cycle was late by the
+  // wall clock, but simulated time waited for it; this is only recorded.
   void report_overruns(std::uint32_t in_a_row, bool was_waited_for = false) noexcept {
     overruns_in_a_row_ = in_a_row;
     was_waited_for_ = was_waited_for;
   }
-  // Archives all state that a cycle leaves to the next. From this state and the recorded inputs, a replay computes the
-  // same setpoints.
+  // Archives all state that a cycle leaves to the next cycle. From this state and the recorded inputs, a replay
+  // computes the session's setpoints again.
   void archive(fieldbus::StateArchive& state) noexcept;
-  // Precondition: the last cycle has run. Sends the drives to NMT pre-operational. Never fails.
+  // Ends the drives' cyclic communication (BusImage::shut_down()). Precondition: the last cycle has run.
   void shut_down() noexcept { bus_.shut_down(period_ns()); }
 
   [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
-  // Results of the tare, and the bias since then.
+  // The measurements, with the results of the tare and the present bias.
   [[nodiscard]] const Measurement& measurement() const noexcept { return measurement_; }
-  // Null: no counts.
+  // Null: the motion doesn't count its computations.
   [[nodiscard]] const MotionWork* work() const noexcept { return motion_->work(); }
   [[nodiscard]] std::span<const ScheduledCommand> scheduled_commands() const noexcept {
     return requests_.commands.script();
@@ -97,10 +98,11 @@ class Cycle {
   [[nodiscard]] std::int64_t rendered_ns() const noexcept { return state_.rendered_ns; }
   // Time from the last cycle to the next.
   [[nodiscard]] std::int64_t period_ns() const noexcept { return ns_of(settings_.period_s); }
-  // Whether all drives have reported, after the last cycle, that they no longer hold their axes.
+  // Whether all drives have reported that they no longer hold their joints. Call after the last cycle.
   [[nodiscard]] bool drives_off() const noexcept { return bus_.drives_off(); }
-  // The latest eight faults that were reset, oldest first; and the number of all.
+  // The latest eight faults that were reset, oldest first.
   [[nodiscard]] std::span<const FaultReport> past_faults() const noexcept { return past_faults_.latest(); }
+  // The number of all faults that were reset.
   [[nodiscard]] std::uint64_t past_fault_count() const noexcept { return past_faults_.count(); }
   [[nodiscard]] const CycleParts& parts() const noexcept { return parts_; }
 
@@ -110,21 +112,21 @@ class Cycle {
     Requests<Timestep> timesteps{4};
     Requests<Command> commands{16};
   };
-  // The session's state between cycles.
+  // The session's state from cycle to cycle.
   struct State {
-    Phase entered_phase = Phase::idle;  // last phase passed to enter()
+    Phase entered_phase = Phase::idle;  // the phase of the last enter()
     std::int64_t phase_since_ns = 0;
     std::int64_t first_cycle_ns = 0;
     std::uint64_t cycle = 0;  // k
     std::uint64_t rendered_cycles = 0;
     std::int64_t rendered_ns = 0;
     bool tared = false;
-    bool wants_resume = false;  // to leave this hold: the enabling input was pressed anew, or on command
-    Command awaits_rest;        // order to release or back off, given while the arm still moved
-    bool yields = false;        // after a stop because of a force, the arm backs off from it
+    bool wants_resume = false;  // rendering shall continue: the enabling input was pressed anew, or by command
+    Command awaits_rest;        // order to release or back off, given before the arm stood
+    bool yields = false;        // the arm was stopped because of a force, and yields to this force
     bool yielded = false;       // yielding is over
     std::int64_t yields_since_ns = 0;
-    std::int64_t moved_ns = 0;  // last time at which a joint without power moved
+    std::int64_t moved_ns = 0;  // last time at which a joint of an arm without power moved
   };
 
   // cycle.cpp: the stages
@@ -172,7 +174,7 @@ class Cycle {
   void supervise_hold(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool may_move() const noexcept;
   [[nodiscard]] bool stands_in_hold() const noexcept;
-  // Number of cycles in time_s, rounded up.
+  // Returns the number of cycles in time_s, rounded up.
   [[nodiscard]] std::uint64_t cycles_of(double time_s) const noexcept;
 
   CycleParts parts_;

@@ -1,4 +1,4 @@
-// Actions of a session's phases, and at their beginning.
+// Contains Cycle's actions in each phase of a session, and at the beginning of each phase.
 #include <algorithm>
 #include <bit>
 #include <optional>
@@ -8,12 +8,12 @@
 namespace proxarm::controller {
 namespace {
 
-// Time for the drives to switch off before the session ends with Fault::drive_not_disabled.
+// Time for the drives to switch off. After this time the session ends with Fault::drive_not_disabled.
 constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
-// An arm without power stands when all encoders have been slower than this for standing_ns.
+// An arm without power counts as standing when all encoders have been slower than this for standing_ns.
 constexpr double standing_rad_per_s = 0.01;
 constexpr std::int64_t standing_ns = 200'000'000;
-// Twice the time for a yield of 20 mm at 0.05 m/s, acceleration included.
+// Twice the time that yielding by 20 mm at 0.05 m/s takes, acceleration included.
 constexpr std::int64_t longest_yield_ns = 1'000'000'000;
 // The tool stays slow for this time after the last fault with reaction `slow`.
 constexpr double clear_of_slow_s = 0.5;
@@ -44,8 +44,8 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
   }
 }
 
-// After stop_0, or a stop that became one, drives lose power at once (goal `none`) and get none again; otherwise they
-// ramp down by themselves.
+// Returns the goal of the drives in a phase. After a stop of category 0, or a stop that was turned into one, drives
+// lose power at once (goal `none`) and don't get power again. After other stops they ramp down by themselves.
 fieldbus::DriveGoal Cycle::goal_in(Phase phase) const noexcept {
   if (phase < Phase::disabling) return fieldbus::DriveGoal::operation_enabled;
   return supervisor_.cuts_power() ? fieldbus::DriveGoal::none : fieldbus::DriveGoal::switched_off;
@@ -141,7 +141,7 @@ void Cycle::run_out(std::int64_t t_k_ns) noexcept {
   }
 }
 
-// The arm stopped because it presses too hard. It yields first; with closed brakes it would keep pressing.
+// Yields after a stop because of an excessive force: if the brakes closed first, the arm would keep pressing.
 void Cycle::yield(std::int64_t t_k_ns) noexcept {
   const bool over = motion_->free(motion_cycle());
   if (!over && may_yield() && t_k_ns - state_.yields_since_ns <= longest_yield_ns) return;
@@ -156,7 +156,7 @@ bool Cycle::may_yield() const noexcept {
 }
 
 void Cycle::await_disabled(std::int64_t t_k_ns) noexcept {
-  bus_.request(goal_in(Phase::disabling));  // may have changed meanwhile
+  bus_.request(goal_in(Phase::disabling));  // the goal may have changed during this phase
   const bool off = bus_.drives_off(), in_time = t_k_ns - state_.phase_since_ns <= disable_timeout_ns;
   if (in_time && (!off || runs_down(t_k_ns))) return;
   if (!off) alarm_.raise(Fault::drive_not_disabled, bus_.first_drive_on());
@@ -165,8 +165,8 @@ void Cycle::await_disabled(std::int64_t t_k_ns) noexcept {
   supervisor_.handle(waits ? Event::wait : Event::disabled);
 }
 
-// Whether an arm without power still moves, or did a moment ago, by its encoders: brakes and gears need time, and the
-// record continues.
+// Whether an arm without power moves by its encoders, or has moved within standing_ns. Brakes and gears need time until
+// the arm stands, and the record continues until then.
 bool Cycle::runs_down(std::int64_t t_k_ns) noexcept {
   if (!supervisor_.cuts_power()) return false;
   const double most_rad = standing_rad_per_s * settings_.period_s;

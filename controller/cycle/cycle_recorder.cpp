@@ -2,7 +2,8 @@
 
 namespace proxarm::controller {
 
-// Clears the box's oldest entry before its reuse: a replay mustn't repeat the requests of that old cycle.
+// The box's entry was used by an old cycle. Clears the entry's requests, since a replay mustn't repeat the requests of
+// the old cycle.
 void CycleRecorder::begin_entry(std::int64_t t_k_ns) noexcept {
   record_ = {};
   entry_ = &box_->begin(t_k_ns);

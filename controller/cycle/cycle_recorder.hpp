@@ -1,7 +1,8 @@
-// Output of a cycle: a record, which a ring passes to the thread that writes files, and an entry of the black box.
+// Stores the output of a cycle: a record, which a ring passes to the thread that writes files, and an entry of the
+// black box.
 //
-// A session without a black box writes to one that stores nothing, so the cycle never checks for one. No allocation,
-// lock or throw after construction.
+// A session without a black box writes to a box that stores nothing, so the cycle needn't check whether there is a
+// black box. Nothing allocates, locks or throws after construction.
 #pragma once
 
 #include <cstddef>
@@ -16,16 +17,16 @@ namespace proxarm::controller {
 
 class CycleRecorder {
  public:
-  // `capacity`: number of records in the ring until they are popped.
+  // `capacity`: largest number of records that wait in the ring until the writing thread pops them.
   explicit CycleRecorder(std::size_t capacity) : records_(capacity), entry_(&no_box_.begin(0)) {}
   CycleRecorder(const CycleRecorder&) = delete;
   CycleRecorder& operator=(const CycleRecorder&) = delete;
 
-  // Precondition: no cycle has run.
+  // Sets the black box. Precondition: no cycle has run.
   void write_to(CycleBox& box) noexcept { box_ = &box; }
 
-  // Begins a cycle with an empty record and entry. If the black box wants a state, archive(StateArchive&) writes the
-  // cycle's whole state.
+  // Begins a cycle with an empty record and an empty entry. If the black box wants a state, archive(StateArchive&)
+  // writes the cycle's whole state to it.
   template <typename Archive>
   void begin(std::int64_t t_k_ns, Archive&& archive) noexcept {
     if (const std::span<std::byte> room = box_->state_room(); !room.empty()) {
@@ -48,10 +49,10 @@ class CycleRecorder {
   void add_status(std::size_t bus, const fieldbus::BusStatus& status) noexcept {
     if (bus < max_buses) entry_->buses[bus] = {status.state, status.receive_overflows};
   }
-  // Ends the cycle, with record and entry complete.
+  // Ends the cycle. Precondition: record and entry are complete.
   void finish() noexcept;
 
-  // For the thread that writes files.
+  // The records, for the thread that writes files.
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return records_; }
 
  private:
@@ -74,7 +75,7 @@ class CycleRecorder {
   SpscRing<CycleRecord> records_;
   NoBox no_box_;
   CycleBox* box_ = &no_box_;
-  BoxCycle* entry_;  // of this cycle
+  BoxCycle* entry_;  // entry of this cycle
 };
 
 }  // namespace proxarm::controller

@@ -1,4 +1,5 @@
-// Requests to the cycle (enabling input, commands, changes of parameters and timestep), and when it may fulfil them.
+// Takes requests to the cycle (enabling input, commands, changes of parameters and timestep), and decides when the
+// cycle may fulfil them.
 #include <cmath>
 #include <utility>
 
@@ -7,12 +8,12 @@
 namespace proxarm::controller {
 namespace {
 
-// The arm may move again this long after the cause of its hold has ended.
+// Time from the end of a hold's cause until the arm may move again.
 constexpr double clear_of_cause_s = 0.1;
 
 }  // namespace
 
-// ---- when
+// ---- when the arm may move
 
 std::uint64_t Cycle::cycles_of(double time_s) const noexcept {
   return static_cast<std::uint64_t>(std::ceil(time_s / settings_.period_s));
@@ -55,7 +56,7 @@ void Cycle::heed_enabling_input(std::int64_t t_k_ns) noexcept {
 
 // ---- commands
 
-// Keeps the refusal of a script command without effect, for the report at the end of the session.
+// Takes a command. If a script's command has no effect, keeps the reason for the report at the end of the session.
 void Cycle::take_command(std::int64_t t_k_ns) noexcept {
   Command command;
   if (!requests_.commands.take(t_k_ns - state_.first_cycle_ns, command)) return;
@@ -94,7 +95,8 @@ void Cycle::obey(const Command& command) noexcept {
   }
 }
 
-// A person who is pinned needn't repeat the order: it waits until the arm stands.
+// Starts a release or a back-off. The order waits until the arm stands, so that a person who is pinned needn't repeat
+// the order.
 void Cycle::start_freeing(const Command& command) noexcept {
   if (supervisor_.phase() != Phase::holding || !may_move() || timestep_.under_way()) return;
   state_.wants_resume = false;
@@ -116,7 +118,7 @@ void Cycle::reset() noexcept {
 // ---- parameters and timestep
 
 void Cycle::take_change() noexcept {
-  // A change that was checked for another timestep waits for the timestep change before it.
+  // A change that was checked for another timestep waits until a due change of the timestep is over.
   const Change* const due = requests_.changes.due(state_.rendered_ns);
   const bool of_another = due != nullptr && due->period_s != 0.0 && due->period_s != settings_.period_s;
   if (of_another && (timestep_.under_way() || requests_.timesteps.due(state_.rendered_ns) != nullptr)) return;
@@ -127,7 +129,8 @@ void Cycle::take_change() noexcept {
   if (change.period_s != 0.0 && change.period_s != settings_.period_s) {
     return requests_.changes.note_refusal("the timestep that it was checked for wasn't taken");
   }
-  // A mass set for tool figures that were refused is corrected, so that the felt mass is as intended.
+  // A proxy's mass may have been computed for tool figures that were refused later. It is corrected, so that the felt
+  // mass is the intended one.
   const double tool_kg = tool_.wanted().mass_kg;
   if (change.parameter == Parameter::mass && change.tool_mass_kg > 0.0 && change.tool_mass_kg != tool_kg) {
     change.value += change.tool_mass_kg - tool_kg;
@@ -140,7 +143,7 @@ void Cycle::take_change() noexcept {
   look_ahead(change.parameter == Parameter::lookahead ? change.value : change.horizon_s);
 }
 
-// Why the tool's new figures can't be true, or nullptr.
+// Takes the tool's new figures. Returns the reason if the figures can't be true and aren't taken; else nullptr.
 const char* Cycle::take_tool(const Change& change) noexcept {
   const HeldTool now = tool_.wanted();
   const HeldTool wanted{change.tool_mass_kg, models::Vec3(change.position_m.data()), now.handle_S};
@@ -159,7 +162,7 @@ void Cycle::fade_tool() noexcept {
   carry_tool();
 }
 
-// Sets the present figures in the models of arm and hand.
+// Sets the tool's present figures in the models of arm and hand.
 void Cycle::carry_tool() noexcept {
   const HeldTool& present = tool_.present();
   parts_.arm->set_tool(present.mass_kg, present.centre_S);

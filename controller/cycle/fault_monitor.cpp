@@ -10,10 +10,11 @@ namespace proxarm::controller {
 namespace {
 
 constexpr std::uint32_t late_sample = 16, late_limit = 8 * late_sample;
-// Factor by which an encoder may seem faster than its joint's limit; oscillating gears make it slightly faster.
+// Factor by which an encoder may seem faster than its joint's speed limit. Oscillating gears make an encoder only
+// slightly faster than the limit.
 constexpr double implausible_speeds = 4.0;
 
-// Whether the drive gives torque: it follows, or brakes by itself.
+// Whether the drive gives torque, to follow setpoints or to brake by itself.
 bool has_power(fieldbus::DriveState state) noexcept {
   return state == fieldbus::DriveState::operation_enabled || state == fieldbus::DriveState::quick_stop_active ||
          state == fieldbus::DriveState::fault_reaction_active;
@@ -28,7 +29,7 @@ std::uint8_t bit_of(std::size_t drive) noexcept { return static_cast<std::uint8_
 }  // namespace
 
 void FaultMonitor::judge_encoders(const Measured& measured, Phase entered) noexcept {
-  // After the power was cut, no command can help.
+  // When power has been cut, further faults can't change anything, so they aren't judged.
   const bool cut = entered == Phase::disabling && supervisor_.cuts_power();
   const Phase judged = cut ? Phase::faulted : entered;
   judge_joints(measured, judged);
@@ -51,7 +52,8 @@ void FaultMonitor::judge_joints(const Measured& measured, Phase entered) noexcep
   }
 }
 
-// A drive is judged from power-on until it reports that it is off. A drive that takes no setpoints brakes by itself.
+// Judges whether drives follow. A drive is judged while it reports that it has power. A drive that takes no setpoints
+// counts as braking by itself.
 void FaultMonitor::judge_following(const Measured& measured, Phase entered) noexcept {
   if (!drives_follow_) return;
   std::uint8_t following = 0, braking = 0;
@@ -76,7 +78,7 @@ void FaultMonitor::judge_following(const Measured& measured, Phase entered) noex
 void FaultMonitor::judge_tool(const Measured& measured, Phase entered) noexcept {
   if (!tool_) return;
   if (entered < Phase::taring || entered > Phase::disabling) return tool_->start();
-  // Without power, only brakes hold the arm, so no command of the controller moves the tool.
+  // Without power, only brakes hold the arm, so the controller can't influence the tool's motion.
   if (entered == Phase::disabling && !any_has_power()) return tool_->start();
   const ToolVerdict verdict = tool_->step(measured.tool_W, measured.elbow_moved_m, settings_.period_s);
   if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, -1, verdict.value, verdict.limit);
@@ -87,8 +89,8 @@ bool FaultMonitor::any_has_power() const noexcept {
 }
 
 void FaultMonitor::judge(const JudgedCycle& cycle) noexcept {
-  // After a gap in the loop's time, drives and sensor are silent or stopped, too. The gap is the cause, so its fault is
-  // latched first.
+  // After a gap in the loop's cycles, drives and sensor are silent or stopped as well. The gap is the cause, so its
+  // fault is raised first.
   if (cycle.overruns_in_a_row > settings_.max_overruns) {
     alarm_.raise(Fault::overrun, -1, cycle.overruns_in_a_row, settings_.max_overruns);
   }
@@ -108,7 +110,8 @@ void FaultMonitor::judge_enabling(const EnablingInput* enabling) noexcept {
   }
 }
 
-// The drives are enabled state by state, so each reports its position before it has power.
+// Judges at the first enabling whether each joint is within its range. A drive is enabled state by state, so it reports
+// its position before it has power.
 void FaultMonitor::judge_start(const JudgedCycle& cycle) noexcept {
   if (cycle.tared || supervisor_.phase() > Phase::taring) return;
   for (Eigen::Index i = 0; i < cycle.measured.axes(); ++i) {
@@ -161,7 +164,7 @@ void FaultMonitor::judge_drives(bool telling) noexcept {
   }
 }
 
-// Drives may fall silent or leave operation while they switch off, but a reported fault is a fault.
+// While drives switch off, they may become silent or leave operation enabled. Only a fault that a drive reports counts.
 void FaultMonitor::judge_switching_off() noexcept {
   for (std::size_t i = 0; i < drives_.size(); ++i) {
     if (!is_faulty(drives_[i].drive.state()) || (state_.faulty & bit_of(i)) != 0) continue;
@@ -191,7 +194,7 @@ void FaultMonitor::judge_sensor(const JudgedCycle& cycle) noexcept {
   state_.missed_samples = cycle.measured.sample_is_new ? 0 : state_.missed_samples + 1;
   judge_lateness(!cycle.telling && state_.missed_samples >= std::max(1u, most / 3));
   if (state_.missed_samples > most) {
-    // If the sensor's counter stands still, each of its samples counts as old: the sensor answers, but is frozen.
+    // If the sensor's counter stands still, no sample counts as new: the sensor answers, but is frozen.
     const bool frozen = cycle.sample.repeats > most;
     alarm_.raise(frozen ? Fault::sensor_frozen : Fault::sensor_lost, -1, state_.missed_samples, most);
   }
@@ -199,7 +202,7 @@ void FaultMonitor::judge_sensor(const JudgedCycle& cycle) noexcept {
   judge_jump(cycle);
 }
 
-// In all phases in which the hand's force moves the arm.
+// Judges jumps of the force in all phases in which the hand's force moves the arm.
 void FaultMonitor::judge_jump(const JudgedCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   state_.since_sample_s += settings_.period_s;
@@ -228,7 +231,8 @@ void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {
   if (settings_.max_repeated_samples > 0 && sample.repeats > settings_.max_repeated_samples) {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);
   }
-  // A saturated gauge repeats one reading without being stuck; in a hold its force isn't needed.
+  // A saturated gauge repeats its largest reading without being stuck. In a hold it isn't a fault, since the force
+  // isn't needed.
   if (settings_.max_repeated_samples > 0 && !sample.saturated &&
       sample.channel_repeats > fieldbus::ChannelWatch::most_repeats) {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.channel_repeats, fieldbus::ChannelWatch::most_repeats);
@@ -240,8 +244,8 @@ void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {
   if (drift_N > bounds_.max_bias_drift_N) alarm_.raise(Fault::sensor_drifts, -1, drift_N, bounds_.max_bias_drift_N);
 }
 
-// A person who is pinned may saturate a strain gauge. A hold, the way into it, and backing off don't need the force, so
-// they continue.
+// Whether the force is needed now. A person who is pinned may saturate a strain gauge. Three phases don't need the
+// force, so they continue: a hold, enabling before a hold, and backing off.
 bool FaultMonitor::needs_force(const JudgedCycle& cycle) const noexcept {
   switch (supervisor_.phase()) {
     case Phase::holding:

@@ -1,13 +1,13 @@
-// Judges in each cycle the state and timing of the devices: buses, drives, sensor, enabling input and the loop itself.
+// Judges in each cycle the state and timing of buses, drives, sensor, enabling input and control loop.
 //
-// It raises faults (fault.hpp); the supervisor decides the reaction. Faults that the motion detects (such as a leash
-// that is too long, or a proxy that isn't finite) aren't judged here.
+// It raises faults (fault.hpp); the supervisor decides the reaction. The motion raises the faults that it detects, such
+// as an exceeded leash or a proxy that isn't finite.
 //
-// A sample counts as late after max_missed_samples/3 cycles without one. The lateness score is in sixteenths of a
-// sample: each late cycle adds 16, each other one subtracts 1. So the score grows if more than one cycle in 17 is late;
-// above eight samples (128) it is a fault.
+// A cycle counts as late if the sensor's sample has been missing for max_missed_samples/3 cycles. The lateness score is
+// in sixteenths of a sample: each late cycle adds 16, every other cycle subtracts 1. So the score grows if more than
+// one cycle in 17 is late. A score of more than eight samples (128) is the fault sensor_late.
 //
-// No allocation, lock or throw after construction.
+// Nothing allocates, locks or throws after construction.
 #pragma once
 
 #include <array>
@@ -37,30 +37,30 @@ namespace proxarm::controller {
 // All inputs for judging a cycle.
 struct JudgedCycle {
   const Measured& measured;
-  const fieldbus::ForceSample& sample;           // the sensor's latest
-  const EnablingInput* enabling = nullptr;       // null: none
-  std::span<const fieldbus::BusStatus> buses{};  // by their index in the network
+  const fieldbus::ForceSample& sample;           // the sensor's latest sample
+  const EnablingInput* enabling = nullptr;       // null: the cell has no enabling input
+  std::span<const fieldbus::BusStatus> buses{};  // status of each bus, in the network's order
   std::uint32_t overruns_in_a_row = 0;
   bool telling = false;                    // SDO answers are on the buses and may delay a drive's TPDO by one frame
-  bool tared = false;                      // the tare is done, so this is no first enabling
+  bool tared = false;                      // the tare is complete, so drives are enabled after a reset
   bool stands = false;                     // the arm should stand still
   bool backs_off = false;                  // the arm backs off in a fixed direction
   std::optional<models::Wrench> load_S{};  // the reading without bias; nullopt: no hand moves the arm
 };
 
-// Readings beyond these bounds are faults.
+// Bounds of the sensor's and the encoders' readings. A reading beyond a bound is a fault.
 struct ReadingBounds {
   double max_force_N = 0.0;
   double max_bias_drift_N = 0.0;
-  double beyond_range_rad = 0.0;  // allowed distance of a joint outside its range at the start
+  double beyond_range_rad = 0.0;  // allowed angle of a joint beyond the end of its range, at the start
   double max_force_step_N = std::numeric_limits<double>::infinity();  // force_jump.hpp
   models::Vec3 handle_S = models::Vec3::Zero();                       // handle point, from the sensor's origin
 };
 
 class FaultMonitor {
  public:
-  // drives_follow and tool: nullopt if the drives take torques, since a hand then moves the arm freely. Precondition:
-  // the references outlive this object. In `settings`, T and the counts of cycles may change.
+  // `tool`, `drives_follow`: nullopt if the drives take torques, since a hand then moves the arm freely. In `settings`,
+  // T and the counts of cycles may change later. Precondition: the references outlive this object.
   FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, const ReadingBounds& bounds,
                const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {},
                std::optional<DriveMonitor> drives_follow = {},
@@ -75,13 +75,14 @@ class FaultMonitor {
         drives_follow_(std::move(drives_follow)),
         standstill_(std::move(standstill)) {}
 
-  // Judges whether an encoder can have reached its position since its last report, and whether drives are near their
-  // setpoints. `entered`: phase of the previous cycle. Phases in which no drive holds the arm aren't judged, since it
-  // may be moved by hand.
+  // Judges by the encoders: whether a joint can have reached its position since its last report, whether drives are
+  // near their setpoints, and whether the tool keeps its limits. `entered`: phase of the previous cycle. Phases in
+  // which no drive holds the arm aren't judged, since a person may then move the arm by hand.
   void judge_encoders(const Measured& measured, Phase entered) noexcept;
+  // Judges everything else.
   void judge(const JudgedCycle& cycle) noexcept;
 
-  // After a reset, earlier faults no longer count. `buses` as in judge().
+  // Call after a reset: earlier faults then no longer count. `buses`: see JudgedCycle.
   void forget(std::span<const fieldbus::BusStatus> buses) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
     archive_fields(state, state_);
@@ -93,11 +94,12 @@ class FaultMonitor {
 
  private:
   struct State {
-    std::uint32_t missed_samples = 0;                         // consecutive
-    std::uint32_t late_score = 0;                             // see the file's head
-    double since_sample_s = 0.0;                              // up to the last cycle
-    std::uint8_t faulty = 0;                                  // drives that report a fault and have been judged for it
-    std::array<std::uint64_t, max_buses> overflows_before{};  // frames lost by each bus that no longer count as a fault
+    std::uint32_t missed_samples = 0;  // number of consecutive cycles without a sample
+    std::uint32_t late_score = 0;      // lateness score
+    double since_sample_s = 0.0;       // time from the last sample to the last cycle
+    std::uint8_t faulty = 0;           // drives whose reported fault has been judged
+    // For each bus: the number of lost frames that no longer count as a fault.
+    std::array<std::uint64_t, max_buses> overflows_before{};
   };
 
   void judge_joints(const Measured& measured, Phase entered) noexcept;

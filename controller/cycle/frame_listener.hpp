@@ -1,4 +1,4 @@
-// Interface for receivers of frames other than process data.
+// Defines the interface of receivers of frames that aren't process data.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,8 @@
 
 namespace proxarm::controller {
 
-// Takes frames that are neither the sensor's nor a drive's process data. Returns true if the frame was for this
-// listener.
+// Receives the frames that aren't process data of the sensor or a drive. on_frame() returns true if the frame was for
+// this listener.
 class FrameListener {
  public:
   FrameListener() = default;

@@ -1,4 +1,4 @@
-// The reset faults of a session: the latest eight, and the number of all.
+// Keeps the faults of a session that were reset: the latest eight, and the number of all.
 #pragma once
 
 #include <algorithm>
@@ -18,11 +18,11 @@ class PastFaults {
     kept_[std::min<std::size_t>(count_, kept_.size() - 1)] = report;
     ++count_;
   }
-  // The latest eight, oldest first.
+  // The latest eight faults, oldest first.
   [[nodiscard]] std::span<const FaultReport> latest() const noexcept {
     return std::span(kept_).first(std::min<std::size_t>(count_, kept_.size()));
   }
-  // The number of all.
+  // The number of all faults that were added.
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
 
  private:

@@ -5,8 +5,8 @@
 namespace proxarm::controller {
 namespace {
 
-// Cycles at rest without a parameter change. The next SYNC latches the last setpoint, the one after reaches it, and the
-// third cycle is for its answer.
+// Number of cycles at rest without a parameter change before the drives get the new period. At the first SYNC the
+// drives latch the last setpoint, at the second SYNC they reach it, and the third cycle is for their answer.
 constexpr std::uint8_t cycles_at_rest = 3;
 
 }  // namespace
@@ -21,10 +21,11 @@ Timestep timestep_of(const SessionSettings& settings) noexcept {
 
 void TimestepChange::begin(const Timestep& from, const Timestep& to, bool resumes, Alarm& alarm) noexcept {
   state_ = {.stage = Stage::coming_to_rest, .wanted = to, .old = from, .resumes = resumes};
-  (void)alarm.take_hold();  // discards earlier ones
+  (void)alarm.take_hold();  // discards holds that were raised before this change
 }
 
-// If something would have held the arm meanwhile, rendering doesn't continue by itself: a person must resume it.
+// If a fault with the reaction `hold` is raised during the change, rendering doesn't continue by itself after the
+// change: a person must resume it.
 TimestepChange::Step TimestepChange::step(std::int64_t t_k_ns, const Surroundings& surroundings, Alarm& alarm,
                                           CycleRecord& record) noexcept {
   if (!under_way()) return {};

@@ -9,24 +9,27 @@ namespace {
 using models::Vec3;
 
 constexpr double filter_s = 0.015;
-// Multiples of σ_f (noise) and of σ/√n (tare). One of three axes exceeds 8 σ_f once in 1e15 samples.
+// Multiples of σ_f (noise) and of σ/√n (tare) in the noise band. One of three axes exceeds 8 σ_f once in 1e15 samples.
 constexpr double noise_deviations = 8.0, tare_deviations = 4.0;
-// How long, or how far, a hand may need no force: moving, within the noise band; at rest, within the wide one.
+// The distance and the shortest time within a band after which the handle counts as empty. Calm: within the noise band.
+// Quiet: within the wider band. longest_s is the longest time for both bands.
 constexpr double calm_way_m = 0.02, shortest_calm_s = 0.06;
 constexpr double quiet_way_m = 0.04, shortest_quiet_s = 0.5;
 constexpr double longest_s = 1.5;
-// Largest distance by which the uncertainty of the tare may move a mass from rest.
+// Largest distance by which the uncertainty of the tare may move the proxy from rest before the handle counts as empty.
 constexpr double unknown_way_m = 1.7e-3;
 constexpr double leaving = 1.5;
 // After an acceleration the arm's first mode (15 Hz) may make the handle oscillate for two periods.
 constexpr double ringing_s = 0.1;
-// The braking force rises within 0.05 s, so that a hand which counted as absent feels a pull, not a jerk.
+// The braking force rises within 0.05 s. A hand that wrongly counts as absent thus feels a pull, not a jerk.
 constexpr double braking_rise_m_per_s3 = 80.0, braking_s = 0.07;
-// Share of the force that led the handle: the oscillating tool behind the sensor adds as much while the arm brakes.
+// Share of the force that led the handle. While the arm brakes, the oscillating tool behind the sensor may add this
+// share to the force.
 constexpr double led_share = 0.2;
-// While the handle is empty, the force that led it is followed with this time constant, at most at this rate.
+// While the handle is empty, bias_W follows the force that led the handle with this time constant, at most at this
+// rate.
 constexpr double followed_s = 0.1, followed_N_per_s = 2.0;
-// The arm's own motion has ended after half a second below 0.1 mm/s.
+// The arm no longer moves when the proxy's speed has been below 0.1 mm/s for half a second.
 constexpr double rest_m_per_s = 1e-4, rest_time_s = 0.5;
 
 }  // namespace
@@ -36,15 +39,16 @@ EmptyHandle::EmptyHandle(const EmptyHandleConfig& config, double period_s) noexc
 
 void EmptyHandle::set_period(double period_s) noexcept { period_s_ = period_s; }
 
-// Size of the hand's wrench less the force that led the handle. A torque counts as the force that makes it at lever_m.
+// Returns the size of the hand's wrench less the force that led the handle. The lever lever_m converts the torque to a
+// force.
 double EmptyHandle::size_N(const models::Wrench& wrench_W) const noexcept {
   const double force_N = (wrench_W.force - state_.bias_W).norm();
   if (!(config_.lever_m > 0.0)) return force_N;
   return std::max(force_N, wrench_W.torque.norm() / config_.lever_m);
 }
 
-// A bias that led the handle remains and keeps drifting. It is followed here until the cycle's tracking of the sensor's
-// bias includes it.
+// Lets bias_W follow the sensor's bias that led the handle, since the sensor's bias may keep drifting. When the handle
+// rests, Measurement::follow_bias() takes the sensor's bias out of the readings.
 void EmptyHandle::follow() noexcept {
   State& s = state_;
   if (!s.led) return;
@@ -54,7 +58,8 @@ void EmptyHandle::follow() noexcept {
   s.bias_W += std::min(1.0, most_N) * behind_W;
 }
 
-// The uncertainty of the tare, large with a noisy sensor, moves the mass; so the time within a band is bounded.
+// Returns the longest time within a band before the handle counts as empty. Reason for this bound: the uncertainty of
+// the tare, unknown_N, moves the proxy while the handle counts as held. A noisy sensor has a large uncertainty.
 double EmptyHandle::longest_empty_s(const HandSigns& signs, double unknown_N) noexcept {
   if (!(signs.mass_kg > 0.0 && unknown_N > 0.0)) return longest_s;
   return std::clamp(std::sqrt(2.0 * unknown_way_m * signs.mass_kg / unknown_N), shortest_quiet_s, longest_s);
@@ -73,7 +78,8 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
   const double sigma_f = signs.noise_N * std::sqrt(std::min(1.0, signs.sample_cycles * T / (2.0 * filter_s)));
   const double sigma_mean = signs.tare_samples > 0.0 ? signs.noise_N / std::sqrt(signs.tare_samples) : 0.0;
   double noise_band = noise_deviations * sigma_f + tare_deviations * sigma_mean;
-  // A hand moved the handle during the tare, or the sensor filters its samples: the noise in σ is then unknown.
+  // If the noise isn't white, a hand moved the handle during the tare or the sensor filters its samples. How much of σ
+  // is noise is then unknown.
   if (!signs.noise_is_white) noise_band = std::min(noise_band, config_.band_N);
   const double band = std::max(config_.band_N, noise_band) + signs.unknown_N;
   noise_band += signs.unknown_N;

@@ -12,18 +12,21 @@ namespace {
 using models::Vec3;
 using models::Wrench;
 
-// Multiples of σ for a sample less the average of about two before it, whose variance is some 2.3 σ². Exceeded once in
-// 1e7 axes and samples, and never for several in a row.
+// Multiple of σ allowed to the noise of the difference between a sample and the average of about two samples before it.
+// This difference has a variance of some 2.3 σ². It exceeds 8 σ once in 1e7 samples of an axis, and never in several
+// successive samples.
 constexpr double noises = 8.0;
 constexpr double least_noises = 20.0;
-// A force that jitters may meet the extrapolation by chance: it is calm only after some ten calm samples.
+// trend_share averages the trend over some four samples. A force that jitters may equal the extrapolation by chance, so
+// calm_kept makes a force count as calm only after some ten calm samples.
 constexpr double trend_share = 0.25, calm_kept = 0.8;
 constexpr double flipped_share = 0.02, least_flip_N = 1.0, least_turn_N = 10.0;
-// A hand's force that flips and then grows by this factor, within a cone of 17 degrees.
+// A hand's force that has flipped must grow by this factor within this time, in a cone of 17 degrees (beside_share).
 constexpr double grown = 2.5, beside_share = 0.3, grows_within_s = 1.0;
-// A change that stays within this share of its size for kept_s is a step. A blow of steel ends within milliseconds.
+// A change is a step if the force then stays for kept_s, to within this share of the change. A blow of steel ends
+// within milliseconds. A force that returns to its value of up to back_s before is no step.
 constexpr double kept_share = 0.2, kept_s = 0.005, back_s = 0.05;
-// A sample later than this many usual intervals doesn't count as the next one.
+// A sample that comes after more than this many usual intervals begins a new sequence of samples.
 constexpr double late = 1.5;
 
 Vec3 turned_about_zero(const Vec3& sign, const Vec3& load, const Vec3& zero) {
@@ -42,8 +45,9 @@ bool ForceJump::is_turned(const LoadSample& sample, const Wrench& turned_S, doub
          off_Nm <= flipped_share * step_Nm + noises * noise_lever_m * sample.noise_N + zero_Nm;
 }
 
-// Whether the load is the extrapolated one with all signs, or those of two axes, reversed. A force that swings through
-// zero also becomes its own opposite between two samples, but the extrapolation expects it.
+// Whether the load equals the extrapolated load with the signs of all three axes or of two axes reversed. A force that
+// swings through zero also becomes its own opposite between two samples, but the extrapolation then expects this
+// opposite. A flip of less than the limit only begins the watch for a flip that grows.
 bool ForceJump::flipped(const LoadSample& sample, const Wrench& expected_S, double off_N) noexcept {
   State& s = state_;
   const double noise_N = least_noises * sample.noise_N;
@@ -70,7 +74,7 @@ bool ForceJump::flipped(const LoadSample& sample, const Wrench& expected_S, doub
   return false;
 }
 
-// Whether the hand's force grows along its line after a flip.
+// Whether the hand's force has grown along one line since the watched flip.
 bool ForceJump::grows(const LoadSample& sample) noexcept {
   State& s = state_;
   if (s.turned_s < 0.0) return false;

@@ -8,20 +8,20 @@ namespace {
 
 using models::Vec3;
 
-// The proxy rests below this speed; a hand that holds still trembles as fast.
+// Below this speed the proxy counts as at rest. A hand that holds still trembles as fast.
 constexpr double at_rest_m_per_s = 2e-3;
 constexpr double first_mark_m = 0.5e-3;
 constexpr std::size_t doublings = 4;
 constexpr double least_growth = 1.45, least_last_growth = 1.6, least_damped_growth = 1.6, most_growth = 2.1;
 constexpr double kept_growth = 0.85;  // the last factor, as a share of the largest
 constexpr double least_time = 0.78, most_time = 1.05;
-// A hundred times the noise of a usual sensor; ratios of smaller forces are unreliable.
+// Smallest judged force, a hundred times the noise of a usual sensor. Ratios of smaller forces are unreliable.
 constexpr double least_force_N = 2.0;
 
 constexpr double near_m = 1e-3, far_m = 1e-2;
 // The line is tested every 30 samples. A test at each sample would now and then reject a good line by chance.
 constexpr double looks = 30.0, bend_noises = 3.0;
-// The share of a fifth allows for the tool behind the sensor, which oscillates as the arm starts.
+// jump_share allows for the oscillation of the tool behind the sensor as the arm starts.
 constexpr double jump_s = 0.03, jump_share = 0.2, jump_noises = 20.0;
 constexpr double ramp_noises = 30.0, constant_noises = 10.0, constant_share = 0.15, speed_gain = 1.5;
 
@@ -71,7 +71,8 @@ void StraightForce::add(const ForceAndMotion& now) noexcept {
   state_.fit.add(now.force_W, now.period_s);
 }
 
-// Whether the force is the same, to within a fifth, as 30 ms after the handle was last empty.
+// Whether the force still equals, to within a fifth, the force of 30 ms after the handle was last empty, and has moved
+// the proxy by far_m.
 bool StraightForce::jumped(const ForceAndMotion& now, bool empty, double noise_N) noexcept {
   State& s = state_;
   if (empty) {
@@ -97,7 +98,7 @@ bool StraightForce::step(const ForceAndMotion& now, bool empty, double noise_N) 
   s.judged = s.judged && now.free && !now.at_handle;
   s.keeps = s.keeps && !now.at_handle;
   if (jumped(now, empty, noise_N)) return true;
-  // While the handle is empty, the bias is tracked, which bends the line.
+  // While the handle is empty, the tracking of the bias bends the line.
   if (!s.judged || empty) {
     s.fit.n = 0.0;
     return false;

@@ -11,11 +11,14 @@ using models::Vec3;
 using models::Wrench;
 
 constexpr double filter_s = 0.015;
-// Below this force the line of action isn't known well enough: its lever would be half uncertainty.
+// The line of action of a smaller force isn't known well enough: half of its lever would be uncertainty.
 constexpr double least_N = 0.3, least_noises = 20.0;
-// A force counts as left over from the tare within this share of it: the hand's push changed during the tare.
+// A force counts as left over from the tare if it equals the opposite of beside_zero_S to within this share of
+// beside_zero_S. The share allows for a hand whose push changed during the tare.
 constexpr double left_share = 0.3;
-constexpr double least_left = 0.3;  // share of the force needed to know a line: the tare's mean is known better
+// Smallest force that counts as left over, as a share of the smallest force with a known line. It can be smaller, since
+// the tare's mean is known better than a single force.
+constexpr double least_left = 0.3;
 
 }  // namespace
 

@@ -7,7 +7,7 @@
 
 namespace proxarm::controller {
 
-// Sums over the samples since the line began; n = 0: no samples. A plain struct, archived with its owner.
+// Sums over the samples since the line began; n = 0: no samples. The struct is plain, so that its owner can archive it.
 struct LineFit {
   models::Vec3 first_W = models::Vec3::Zero();  // first force; subtracted in all sums
   models::Vec3 h = models::Vec3::Zero(), th = models::Vec3::Zero(), hh = models::Vec3::Zero();
@@ -26,7 +26,7 @@ struct LineFit {
   }
 };
 
-// Results of the fit. Precondition: at least three samples, one every period_s.
+// The fitted line.
 struct FittedLine {
   models::Vec3 end_W;        // the line at the last sample
   models::Vec3 risen_W;      // the line's rise since the first sample
@@ -34,7 +34,9 @@ struct FittedLine {
   double deviation = 0.0;    // relative standard deviation of the estimated variance
 };
 
-// b = (n Σth − Σt Σh)/(n Σtt − (Σt)²),  a = (Σh − b Σt)/n,  residual variance: (Σhh − a Σh − b Σth)/(n − 2).
+// Returns the line with
+//   b = (n Σth − Σt Σh)/(n Σtt − (Σt)²),  a = (Σh − b Σt)/n,  residual variance (Σhh − a Σh − b Σth)/(n − 2).
+// Precondition: at least three samples, one every period_s.
 inline FittedLine fitted(const LineFit& s, double period_s) noexcept {
   const models::Vec3 b = (s.n * s.th - s.t * s.h) / (s.n * s.tt - s.t * s.t);
   const models::Vec3 a = (s.h - b * s.t) / s.n;
@@ -45,8 +47,9 @@ inline FittedLine fitted(const LineFit& s, double period_s) noexcept {
           .deviation = std::sqrt(2.0 / (s.n - 2.0))};
 }
 
-// Whether the residuals are larger than the noise (standard deviation noise_N), by more than `deviations` standard
-// deviations of the estimated variance plus a motion of swing_N. A NaN variance counts as bent.
+// Whether the force bends: in some axis the residual variance exceeds the noise's variance noise_N² by more than
+// `deviations` standard deviations of the estimated variance plus swing_N², the variance of an oscillation. A line
+// whose variance is NaN counts as bent.
 inline bool bends(const FittedLine& line, double noise_N, double deviations, double swing_N = 0.0) noexcept {
   return !(line.variance_N2.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * line.deviation) + swing_N * swing_N);
 }

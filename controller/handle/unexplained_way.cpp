@@ -8,14 +8,15 @@ namespace {
 
 using models::Vec3;
 
-// With nobody at the handle the arm may move 5 cm: twice this distance plus the braking distance.
+// Largest distance on one straight line. With nobody at the handle the arm may move 5 cm: twice this distance plus the
+// braking distance.
 constexpr double longest_way_m = 0.02;
 // The line is tested every 10 samples. A test at each sample would now and then reject a good line by chance.
 constexpr double looks = 10.0, deviations = 4.0;
-// Share of the force. A hand of 100 N/m changes its force by 2 N over the allowed distance. The tool behind the sensor
-// oscillates by 6 % of the force at first, and the oscillation decays.
+// s, the share of the force that is allowed to the oscillation of the tool behind the sensor. This oscillation begins
+// with 6 % of the force and decays. A hand of 100 N/m changes its force by 2 N over longest_way_m.
 constexpr double share = 0.02;
-// Assumed noise if the sensor's is unknown.
+// Smallest assumed noise of the sensor.
 constexpr double least_noise_N = 0.005;
 constexpr double rest_m_per_s = 0.01, seen_s = 0.02;
 constexpr double small_N = 1.5, same_share = 0.2, accelerated_share = 0.5, long_s = 1.0;

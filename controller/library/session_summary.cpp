@@ -1,4 +1,5 @@
 #include "controller/library/session_summary.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,13 +1,15 @@
-// The limits of one step in the N coordinates of a scene, and the projection of a point onto them.
+// Projects a point onto the limits of one step, in the N coordinates of a scene.
 //
 //   min ½‖x − y‖²   over   n_i·x ≤ b_i,  ‖x − c_j‖ ≤ r_j
 //
 // At most N of the sets, the active ones, determine the solution:
 //   y − x = Σ λ_i g_i,  λ_i ≥ 0,  g_i: outward unit normal of set i at x
-// An active-set method finds them, as for linear programs of low dimension (Sharir and Welzl 1992). The set that the
-// present point violates most joins the active ones. Every subset of at most N of these candidates that includes the
-// new set is tried (7 in space); one of them is optimal for all candidates. Each exchange increases the distance from
-// y, so no active set occurs twice.
+// An active-set method finds the active sets, like a method for linear programs of low dimension (Sharir and Welzl
+// 1992). It repeats an exchange:
+//   1. The set that the present point violates most becomes a candidate, beside the active sets.
+//   2. Every subset of at most N candidates that includes the new candidate is tried (7 subsets if N = 3). One of these
+//      subsets is optimal for all candidates, and becomes the active sets.
+// Each exchange increases the distance of x from y, so no combination of active sets occurs twice.
 //
 // All lengths in m. Nothing allocates, locks or throws.
 #pragma once
@@ -25,7 +27,7 @@
 
 namespace proxarm::controller {
 
-// The sets of one step, and the projection onto them. x is q − q₁.
+// The sets of one step, and the projection onto these sets. All points x are relative to q₁: x = q − q₁.
 template <int N>
 class LimitSets {
  public:
@@ -36,7 +38,7 @@ class LimitSets {
     arm_ = nullptr;
   }
 
-  // The intersection of the sets, given in W, with a scene's space (basis: 3×N, orthonormal).
+  // Sets the sets to the intersection of `limits`, given in W, with a scene's space (basis: 3×N, orthonormal).
   void set(const StepLimits& limits, const Eigen::Matrix<double, 3, N>& basis) noexcept {
     clear();
     for (std::size_t i = 0; i < limits.soft_count; ++i) soft_[soft_count_++] = cut(limits.soft[i], basis);
@@ -47,8 +49,9 @@ class LimitSets {
     basis_ = basis;
   }
 
-  // Whether the arm can follow a step to x, by its exact kinematics. `scene_x`: the same point in the scene's
-  // coordinates. If these are W's, the query uses scene_x itself, the exact place that the arm is sent to.
+  // Whether the arm can follow a step to x, by its exact kinematics. `scene_x`: the point x in the scene's coordinates,
+  // not relative to q₁. If the scene's coordinates are W's, the query uses scene_x itself, the exact place that the arm
+  // is sent to.
   [[nodiscard]] bool followed(const V& x, const V& scene_x) const noexcept {
     if (arm_ == nullptr) return true;
     if constexpr (N == 3) {
@@ -57,7 +60,8 @@ class LimitSets {
     return arm_->contains(to_W(x));
   }
 
-  // Walls are further half-spaces for nearest(): −n·x ≤ −n·point, n out of the wall. At most `most_walls`.
+  // Walls are further half-spaces for nearest(): −n·x ≤ −n·point, where n points out of the wall. There are at most
+  // `most_walls`.
   static constexpr std::size_t most_walls = 6;
   void clear_walls() noexcept { flat_count_ = plane_count_; }
   void add_wall(const V& point, const V& normal) noexcept {
@@ -77,21 +81,21 @@ class LimitSets {
     return true;
   }
 
-  // A point of the sets, and the sets that determine it.
+  // A point that keeps all sets, and the active sets that determine it.
   struct Nearest {
     Nearest() noexcept { basis.fill(V::Zero()); }
 
     V x = V::Zero();
-    std::array<std::size_t, N> members{};  // the active sets: index as in violation()
-    std::array<V, N> basis;                // orthonormal; spans their normals at x
-    std::size_t count = 0;                 // of members and basis
+    std::array<std::size_t, N> members{};  // the active sets, by their index in violation()
+    std::array<V, N> basis;                // orthonormal; spans the active sets' normals at x
+    std::size_t count = 0;                 // number of entries of members and of basis
     double bend = 0.0;                     // Σ λ_j/r_j over the active balls
     V shift = V::Zero();                   // −Σ λ_i g_i over the active limits, without walls
-    bool exact = false;                    // false: found by Dykstra's algorithm, no members
+    bool exact = false;                    // false: found by Dykstra's algorithm, without members
     ActiveLimits active;
 
-    // ∂x/∂y v = (E − Σ e eᵀ) v / (1 + Σ λ_j/r_j). This follows from y − x = Σ λ_i g_i with fixed active sets: along
-    // their common surface, each ball's normal turns by 1/r_j per unit of length.
+    // Returns ∂x/∂y v = (E − Σ e eᵀ) v / (1 + Σ λ_j/r_j). This formula follows from y − x = Σ λ_i g_i with constant
+    // active sets: along the common border of the active sets, each ball's normal turns by 1/r_j per unit of length.
     [[nodiscard]] V derivative(const V& v) const noexcept {
       V along = v;
       for (std::size_t i = 0; i < count; ++i) along -= basis[i].dot(v) * basis[i];
@@ -99,8 +103,9 @@ class LimitSets {
     }
   };
 
-  // The sets' point nearest to y. If no active sets solve the problem, because the sets have almost no common point,
-  // Dykstra's algorithm computes the point. `sweeps`: its sweeps left; decreased by those made.
+  // Returns the point nearest to y that keeps all sets. If no active sets solve the problem, because the sets have
+  // almost no common point, Dykstra's algorithm computes the point. `sweeps`: the number of sweeps that Dykstra's
+  // algorithm may still make; decreased by the sweeps made.
   [[nodiscard]] Nearest nearest(const V& y, bool with_soft, int& sweeps) noexcept {
     Nearest result;
     for (int cuts = 0;; ++cuts) {
@@ -114,11 +119,12 @@ class LimitSets {
     }
   }
 
-  // Moves x back into the sets, towards the point that braking leads to (or q₁, if that is in the sets). For an x that
-  // the alternation of contacts and limits, or Dykstra's algorithm, left outside.
+  // Returns x, moved back into the sets along the line to a base point. The base point is q₁ if q₁ is in the sets, else
+  // the point to which braking leads. Use this function if the alternation of contacts and limits, or Dykstra's
+  // algorithm, has left x outside.
   [[nodiscard]] V draw_back(const V& x, bool with_soft) const noexcept {
     V base = V::Zero();
-    for (std::size_t i = 0; i < hard_count_; ++i) {  // the last ball, of the acceleration, decides
+    for (std::size_t i = 0; i < hard_count_; ++i) {  // the last ball, the acceleration's, has the last word
       const double off = (base - hard_[i].centre).norm();
       if (off > hard_[i].radius_m) base = hard_[i].centre + hard_[i].radius_m / off * (base - hard_[i].centre);
     }
@@ -135,13 +141,14 @@ class LimitSets {
 
  private:
   static constexpr double sweep_tolerance_m = 1e-13;
-  static constexpr int most_exchanges = 60;  // of active sets; usually about 3
+  static constexpr int most_exchanges = 60;  // usually about 3 are needed
   static constexpr double parallel = 1e-12;  // normals count as parallel below this sine of their angle
-  static constexpr int most_cuts = 8;        // per call of nearest(); usually one or two
+  static constexpr int most_cuts = 8;        // most calls of take_in_cut() in one nearest(); usually one or two
 
   [[nodiscard]] models::Vec3 to_W(const V& x) const noexcept { return q_k1_W_ + basis_ * x; }
 
-  // Adds the half-space that separates x from the followable steps; false if the arm can follow x. Walls stay last.
+  // Adds the half-space that separates x from the steps that the arm can follow. Returns false if the arm can follow x,
+  // or if the half-space can't be added. Walls stay last.
   bool take_in_cut(const V& x) noexcept {
     LimitPlane<3> plane;
     if (plane_count_ == StepLimits::max_planes || !arm_->cut(to_W(x), q_k1_W_, plane)) return false;
@@ -159,13 +166,13 @@ class LimitSets {
       if (plane_count_ == StepLimits::max_planes) break;
       const V normal = basis.transpose() * plane.normal;
       const double length = normal.norm();
-      if (!(length > 1e-9)) continue;  // normal to the scene's space: motion in it comes no nearer
+      if (!(length > 1e-9)) continue;  // no motion in the scene's space approaches this plane
       planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limits};
     }
     flat_count_ = plane_count_;
   }
 
-  // Sets by number: planes (limits, then walls), hard balls, soft balls.
+  // The number of sets. Their indices count through planes (limits, then walls), hard balls and soft balls.
   [[nodiscard]] std::size_t size(bool with_soft) const noexcept {
     return flat_count_ + hard_count_ + (with_soft ? soft_count_ : 0);
   }
@@ -174,7 +181,7 @@ class LimitSets {
   [[nodiscard]] const LimitBall<N>& ball(std::size_t i) const noexcept {
     return i < flat_count_ + hard_count_ ? hard_[i - flat_count_] : soft_[i - flat_count_ - hard_count_];
   }
-  // Distance of x outside set i; negative inside.
+  // Returns the distance of x from the border of set i; negative if x is inside.
   [[nodiscard]] double violation(std::size_t i, const V& x) const noexcept {
     return is_ball(i) ? (x - ball(i).centre).norm() - ball(i).radius_m : planes_[i].normal.dot(x) - planes_[i].bound_m;
   }
@@ -198,12 +205,13 @@ class LimitSets {
       }
       const Nearest before = result;
       if (!exchange(y, before, worst, result)) return false;
-      if (!((result.x - y).squaredNorm() > (before.x - y).squaredNorm())) return false;  // differs only by rounding
+      if (!((result.x - y).squaredNorm() > (before.x - y).squaredNorm())) return false;  // only rounding differs
     }
     return false;
   }
 
-  // The point nearest to y of the formerly active sets and `added`, which is active now. Tries small subsets first.
+  // Finds the point nearest to y that keeps the formerly active sets and the set `added`, with `added` active. Tries
+  // small subsets first.
   bool exchange(const V& y, const Nearest& before, std::size_t added, Nearest& result) const noexcept {
     for (std::size_t others = 0; others < N && others <= before.count; ++others) {
       for (unsigned choice = 0; choice < 1u << before.count; ++choice) {
@@ -224,10 +232,10 @@ class LimitSets {
     return false;
   }
 
-  // The point nearest to y on the borders of all of result.members. False if they have no common point, or if it isn't
-  // the nearest point of the sets themselves (some λ < 0).
+  // Finds the point nearest to y on the borders of all result.members. Returns false if the borders have no common
+  // point, or if some λ < 0: then the intersection of the sets has a point nearer to y.
   bool nearest_of_all(const V& y, Nearest& result) const noexcept {
-    // Two spheres meet in a circle; the plane of that circle replaces all balls but the first.
+    // Two spheres meet in a circle. Each ball but the first is replaced by the plane of its circle with the first ball.
     std::array<V, N> e;
     e.fill(V::Zero());
     std::array<double, N> offset{};
@@ -274,7 +282,8 @@ class LimitSets {
     return presses(y, outwards, result);
   }
 
-  // Gram-Schmidt: removes from n·x = b what the equations e_k·x = offset_k imply. False if n depends on them.
+  // Makes n orthogonal to all e_k (Gram-Schmidt), and changes b by the equations e_k·x = offset_k so that n·x = b stays
+  // true. Returns false if n depends linearly on the e_k.
   static bool orthogonal(V& normal, double& bound, const std::array<V, N>& e, const std::array<double, N>& offset,
                          std::size_t count) noexcept {
     for (std::size_t k = 0; k < count; ++k) {
@@ -289,7 +298,8 @@ class LimitSets {
     return true;
   }
 
-  // Solves y − x = Σ λ_i g_i by a QR decomposition of the g_i. False if a λ_i is negative.
+  // Solves y − x = Σ λ_i g_i by a QR decomposition of the g_i. Returns false if a λ_i is negative, or if the g_i are
+  // linearly dependent.
   bool presses(const V& y, const V& outwards, Nearest& result) const noexcept {
     std::array<std::array<double, N>, N> R{};
     std::array<double, N> lambda{};
@@ -327,11 +337,12 @@ class LimitSets {
     }
   }
 
-  // Projection by Dykstra's alternating projections (Boyle and Dykstra 1986). The hard balls come last, so that even a
-  // result that hasn't converged satisfies them. `active`: the sets with a nonzero force. `sweeps` as in nearest().
+  // Projects x onto the sets by Dykstra's alternating projections (Boyle and Dykstra 1986). The hard balls come last in
+  // each sweep; even a result that hasn't converged so keeps the last of them. Sets `active` to the sets with a nonzero
+  // force. `sweeps`: see nearest().
   V project(V x, bool with_soft, ActiveLimits& active, int& sweeps) const noexcept {
     std::array<V, 2> soft{}, hard{};
-    std::array<double, StepLimits::max_planes> pushed{};  // along the planes' normals, ≥ 0
+    std::array<double, StepLimits::max_planes> pushed{};  // corrections along the planes' normals, ≥ 0
     for (auto* corrections : {&soft, &hard}) corrections->fill(V::Zero());
     for (bool first = true; first || sweeps > 0; first = false, --sweeps) {
       double change = 0.0;
@@ -368,7 +379,8 @@ class LimitSets {
   static bool inside(const LimitBall<N>& ball, const V& x, double tolerance_m) noexcept {
     return (x - ball.centre).norm() <= ball.radius_m + tolerance_m;
   }
-  // The largest t ≤ 1 for which base + t d is in the ball: ‖base − c + t d‖² = r². Precondition: base is in the ball.
+  // Returns the largest t ≤ 1 with base + t d in the ball, from ‖base − c + t d‖² = r². Precondition: base is in the
+  // ball.
   static double way_within(const LimitBall<N>& ball, const V& base, const V& d) noexcept {
     const V from = base - ball.centre;
     const double a = d.squaredNorm(), b = from.dot(d);
@@ -379,7 +391,7 @@ class LimitSets {
   static void note(const LimitBall<N>& ball, const V& correction, ActiveLimits& active) noexcept {
     if (correction != V::Zero()) active.set(ball.limit);
   }
-  // A ball's intersection with the scene's line or plane through q₁; a point if they don't meet.
+  // Returns a ball's intersection with the scene's line or plane through q₁; a ball of radius 0 if they don't meet.
   static LimitBall<N> cut(const LimitBall<3>& ball, const Eigen::Matrix<double, 3, N>& basis) noexcept {
     const V centre = basis.transpose() * ball.centre;
     const double off2 = (ball.centre - basis * centre).squaredNorm();

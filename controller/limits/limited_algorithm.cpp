@@ -45,7 +45,7 @@ auto LimitedAlgorithm<N>::solve(double K, const V& p, const V& q, const V& free)
     now = at(step, now.shift - now.gap);
     const double gap = now.gap.norm();
     if (gap <= tolerance_m) return take(now);
-    // The gap no longer shrinks: contacts and limits have no common point.
+    // If the gap no longer shrinks, contacts and limits have no common point.
     stuck = std::abs(gap - gap_before) <= 1e-3 * gap ? stuck + 1 : 0;
     if (stuck >= 3 || (!now.l.exact && step.sweeps <= 0)) break;
     gap_before = gap;
@@ -93,7 +93,7 @@ bool LimitedAlgorithm<N>::jump(Step& step, Try& now) noexcept {
     }
     V ds = J.fullPivLu().solve(-now.gap);
     if (!ds.allFinite()) return false;
-    // The present forces bound the step, since J is nearly singular when 𝒢 sticks or jams.
+    // The size of the present forces (over κ) bounds ds, since J is nearly singular when 𝒢 sticks or jams.
     const double most = (now.r - step.p).norm(), length = ds.norm();
     if (length > most) ds *= most / length;
     now = at(step, now.shift + ds);
@@ -112,7 +112,7 @@ auto LimitedAlgorithm<N>::take(const Try& solution) noexcept -> V {
 template <int N>
 auto LimitedAlgorithm<N>::give_way(Step& step, const Try& last) noexcept -> V {
   active_ = last.l.active;
-  const V held = last.r - step.p - last.shift;  // the contacts' force, over κ
+  const V held = last.r - step.p - last.shift;  // the contacts' force divided by κ
   V l;
   if (sets_.contains(V::Zero(), tolerance_m, step.with_soft)) {
     l = sets_.draw_back(last.r - q_k1_, step.with_soft);

@@ -1,20 +1,22 @@
-// A 𝒢 that also keeps the limits of a step: q(k) minimises ‖q − p̂‖ over contacts ∩ limits.
+// Extends a 𝒢 by the limits of a step: q(k) minimises ‖q − p̂‖ over contacts ∩ limits.
 //
-// The solver looks for the limits' force λ with r = l:
-//   r = 𝒢(κ, p̂ + λ/κ, q₁),   l = P(r − λ/κ)
-// The contacts answer λ with their own force, friction included, which leads to r. P projects onto the limits. Then λ =
-// κ (l − (r − λ/κ)) is in the limits' normal cone at r. Neither a normal cone nor 𝒢 (Assumption 1) depends on κ, so the
-// combined map doesn't either. A step is solved only if r = l within rounding. Methods:
+// The solver looks for the limits' force λ that makes two points equal, r = l:
+//   r = 𝒢(κ, p̂ + λ/κ, q₁)   the inner 𝒢's point; the contacts' force, friction included, reacts to λ
+//   l = P(r − λ/κ)           the projection P onto the limits
+// If r = l, then −λ = κ ((r − λ/κ) − l) is in the limits' normal cone at r. Neither a normal cone nor 𝒢 (Assumption 1)
+// depends on κ, so the combined map doesn't depend on κ either. A step counts as solved only if r = l within rounding.
+// Methods:
 //   free      without contact: λ/κ = P(p̂) − p̂
-//   joined    contacts become half-spaces among the limits, with friction held: exact at once on flat surfaces without
-//             friction
-//   Newton    semismooth Newton (Qi and Sun 1993) on r(λ) − l(λ), with finite differences of 𝒢 and the active limits as
-//             its derivative: for friction and media
-//   in turn   block Gauss-Seidel, λ/κ ← l − (r − λ/κ); in turns 1, 2, 4, 8 … the two methods above are tried again
-// If contacts and limits have no common point, the contacts give way: q is the limits' point nearest to the contacts'.
-// If the limits alone have no common point, the soft ones (leash, power) give way.
+//   joined    Contacts become half-spaces among the limits, and friction is held constant. On flat surfaces without
+//             friction one solution is exact.
+//   Newton    Semismooth Newton (Qi and Sun 1993) on r(λ) − l(λ), for friction and media. The derivative comes from
+//             finite differences of 𝒢 and from the active limits.
+//   in turn   Block Gauss-Seidel, λ/κ ← l − (r − λ/κ). In turns 1, 2, 4, 8 … of this method, the methods joined and
+//             Newton are tried first.
+// If contacts and limits have no common point, the contacts give way: q is the limits' point nearest to the contacts'
+// point. If the limits alone have no common point, the soft limits (leash, power) give way.
 //
-// If no limit is active, the result is the inner 𝒢's, to the bit. Nothing allocates, locks or throws.
+// If no limit is active, the result equals the inner 𝒢's result to the bit. Nothing allocates, locks or throws.
 #pragma once
 
 #include <array>
@@ -25,7 +27,7 @@
 
 namespace proxarm::controller {
 
-// Object number of contacts with a limit; code that counts contacts with the scene skips it.
+// Object number of contacts with a limit. Code that counts contacts with the scene skips contacts with this number.
 inline constexpr std::int32_t limit_object = -2;
 
 template <int N>
@@ -36,8 +38,8 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
   // Precondition: `inner` outlives this object.
   explicit LimitedAlgorithm(models::GeometricAlgorithm<N>& inner) : inner_(&inner) {}
 
-  // Precondition: called before each step, with the sets around the true q₁ = q(k−1), even if a step of order 2 starts
-  // from another point.
+  // Sets the limits of the next step. Precondition: called before each step, with sets around the true q₁ = q(k−1),
+  // even if a step of order 2 starts from another point.
   void set_limits(const StepLimits& limits, const Eigen::Matrix<double, 3, N>& basis, const V& q_k1) noexcept;
 
   V operator()(double K, const V& p, const V& q) noexcept override;
@@ -50,7 +52,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
     return {contacts_.data(), count_};
   }
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return inner_->unresolved_steps(); }
-  // True only if contacts squeeze the proxy. A limit that leaves the proxy inside an object shows in active().
+  // True only if contacts squeeze the proxy. If a limit leaves the proxy inside an object, this limit is in active().
   [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
 
   // λ/κ of the last call. The limits' force on the proxy is κ times this.
@@ -60,11 +62,12 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
 
  private:
   static constexpr int most_turns = 300;
-  static constexpr int few_joins = 3, most_joins = 10;  // with friction; without, one suffices
-  static constexpr int most_jumps = 6;                  // a converging Newton takes two or three
-  static constexpr int most_sweeps = 3000;              // in total per step, some 50 ns each
-  static constexpr double tolerance_m = 1e-11;          // on r − l: 10 nm/s at 1 kHz
-  static constexpr double nudge_m = 1e-9;  // of p; with 𝒢's rounding of 1e-16 m, differences keep seven digits
+  static constexpr int few_joins = 3, most_joins = 10;  // iterations of join() with friction; one suffices without it
+  static constexpr int most_jumps = 6;                  // iterations of jump(); two or three if it converges
+  static constexpr int most_sweeps = 3000;              // Dykstra's sweeps in total per step, some 50 ns each
+  static constexpr double tolerance_m = 1e-11;          // tolerance of r = l; 10 nm/s at 1 kHz
+  // Change of p for finite differences. They keep seven digits, since 𝒢's rounding errors are 1e-16 m.
+  static constexpr double nudge_m = 1e-9;
 
   struct Step {
     double K;
@@ -89,23 +92,26 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
 
   V solve(double K, const V& p, const V& q, const V& free) noexcept;
 
-  // A flat contact without friction is a half-space like a limit, so one projection solves for both. Friction is held
-  // at its value at the last r; curved surfaces become their tangent planes there.
-  enum class Joined : std::uint8_t { settled, unsettled, apart };  // apart: contacts and limits have no common point
+  // Solves by the method `joined`. A flat contact without friction is a half-space like a limit, so one projection
+  // solves for contacts and limits together. Friction keeps its value at the last r; curved surfaces are replaced by
+  // their tangent planes at the last r. Result `apart`: contacts and limits have no common point.
+  enum class Joined : std::uint8_t { settled, unsettled, apart };
   Joined join(Step& step, Try& now, int most) noexcept;
 
-  // The friction: the part of a contact force outside the span of the contacts' normals.
+  // Returns the friction: the part of a contact force that is outside the span of the contacts' normals.
   [[nodiscard]] V across_contacts(V force) const noexcept;
 
-  // Semismooth Newton on r = l, with differences of 𝒢 and the projector of the active limits as derivatives:
+  // Solves r = l by semismooth Newton for the shift s = λ/κ:
   //   F(s) = r(s) − P(r(s) − s) = 0,   dF = [(E − P′) R + P′] ds,   R = ∂r/∂s
-  // Each iterate determines the active limits and contacts anew. False if it doesn't converge.
+  // R comes from finite differences of 𝒢, P′ from the active limits. Each iteration determines the active limits and
+  // contacts anew. Returns false if the iteration doesn't converge.
   bool jump(Step& step, Try& now) noexcept;
 
   V take(const Try& solution) noexcept;
 
-  // The result if r = l has no solution. Usually q₁ is in both sets; if the free space is convex, the straight line
-  // from q₁ to the contacts' point then crosses no object. If q₁ is outside the limits, the contacts give way.
+  // Returns the result if r = l has no solution. Usually q₁ keeps contacts and limits; the result is then on the
+  // straight line from q₁ to the contacts' point, which crosses no object if the free space is convex. If q₁ is outside
+  // the limits, the contacts give way.
   V give_way(Step& step, const Try& last) noexcept;
 
   void gather_contacts() noexcept;

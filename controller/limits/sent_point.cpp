@@ -10,12 +10,13 @@ using models::Vec3;
 
 namespace {
 
-constexpr double tolerance_m = 1e-11;  // 10 nm/s at 1 kHz, as in limited_algorithm.hpp
-// Limits that bound the motion of c, not its place: with them, c follows p as fast as they allow.
+constexpr double tolerance_m = 1e-11;  // equals the tolerance in limited_algorithm.hpp: 10 nm/s at 1 kHz
+// Limits that bound the motion of c, not its place. If only these limits are active, c follows p as fast as they allow.
 constexpr auto catches_up =
     static_cast<std::uint16_t>(static_cast<unsigned>(Limit::speed) | static_cast<unsigned>(Limit::acceleration) |
                                static_cast<unsigned>(Limit::power) | static_cast<unsigned>(Limit::leash));
-constexpr int most_sweeps = 300;  // of Dykstra's algorithm, if the sets have almost no common point
+// Most sweeps of Dykstra's algorithm in a step, if the sets have almost no common point.
+constexpr int most_sweeps = 300;
 
 }  // namespace
 
@@ -78,14 +79,14 @@ void SentPoint::step(const Vec3& q_W, const Vec3& predicted_W, const StepLimits&
   state_.c_k1_W += way;
 }
 
-// Starts the filter's state 2/ω behind q_W, as if q_W had always moved at this velocity.
+// Starts the filter's state behind q_W by 2/ω times the velocity, as if q_W had always moved at this velocity.
 void SentPoint::start_filter(const Vec3& q_W, const Vec3& velocity_W) noexcept {
   state_.v_W = velocity_W;
   state_.x_W = q_W;
   if (omega_rad_per_s_ > 0.0) state_.x_W -= 2.0 / omega_rad_per_s_ * velocity_W;
 }
 
-// As ElasticSetpoint::step() filters the link angles.
+// Filters q_W with the equations with which ElasticSetpoint::step() filters the link angles.
 void SentPoint::filter(const Vec3& q_W) noexcept {
   if (!(omega_rad_per_s_ > 0.0)) return;
   const double omega = omega_rad_per_s_, T = period_s_;

@@ -11,7 +11,8 @@ using models::Vec3;
 
 namespace {
 
-// Commanded share of the tool's speed limit. Elastic gears add some 7 % when the hand pulls the arm along at the limit.
+// Share of the tool's speed limit that setpoints may use. Elastic gears add some 7 % to the tool's speed when the hand
+// pulls the arm along at the limit.
 constexpr double commanded_share = 0.9;
 
 void add_plane(StepLimits& out, const LimitPlane<3>& plane) noexcept {
@@ -96,7 +97,7 @@ void StepLimiter::add_balls(const StepStart& start, StepLimits& out) const noexc
 void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out) const noexcept {
   const double T = period_s_;
   const double share = T / (T + limits_.max_tool_speed_m_per_s / limits_.max_tool_acceleration_m_per_s2);
-  // A point outside may not go further out.
+  // A point beyond a border may not go further out.
   const auto room = [&](double d, double setback) {
     return borders == Borders::walls ? d : std::max(0.0, share * (d - setback));
   };

@@ -14,36 +14,36 @@ using models::Vec3;
 
 namespace {
 
-// Each step keeps the proxy within the leash to 1e-9 m or better; this margin is well above that.
+// Tolerance of the leash. Each step keeps the proxy within the leash to 1e-9 m or better.
 constexpr double leash_tolerance_m = 1e-6;
-// Highest rate of change of the tool's speed limit, also bounded to a quarter of the cell's acceleration limit, so that
-// the sets of speed and acceleration always intersect.
+// Highest rate of change of the tool's speed limit. A quarter of the cell's acceleration limit is another bound of this
+// rate, so that the sets of speed and acceleration always intersect.
 constexpr double speed_limit_m_per_s2 = 1.0;
-// If nothing was touched, the hand's force gives the direction to back off, if it exceeds this.
+// If the tool has touched nothing, a hand's force above this value gives the direction of a back-off.
 constexpr double pinning_force_N = 5.0;
-// A torque that turns the tool counts as the force that makes it at this lever, a handle's length.
+// Lever that converts a torque on the tool to a force: a handle's length.
 constexpr double torque_lever_m = 0.1;
-// Allowed lag of a held orientation when the joints can't turn the tool fast enough, near a wrist singularity. Half of
-// what a person notices in a handle.
+// Allowed lag of a held orientation when the joints can't turn the tool fast enough, near a wrist singularity. It is
+// half of the angle that a person notices in a handle.
 constexpr double held_lag_rad = 0.1;
-// Places closer than this are equal: tolerance of the kinematics, plus rounding.
+// Places that are closer than this count as equal. It is the tolerance of the kinematics plus rounding.
 constexpr double same_place_m = 2e-12;
-// Turning lags below this are within the tolerance of the kinematics.
+// Orientations that differ by less count as equal. It is the tolerance of the kinematics.
 constexpr double same_turn_rad = 1e-9;
 
 Eigen::Quaterniond orientation_of(const models::Pose& X_WT) noexcept {
   return Eigen::Quaterniond(X_WT.linear()).normalized();
 }
 
-// Limits the turning speed that the proxy takes over from the arm. Joints that turn the tool faster than its proxy for
-// a moment would add energy, and the arm would swing by itself.
+// Limits the turning speed that the proxy takes over from the arm to `most`. Joints that turn the tool faster than the
+// proxy for a moment would otherwise add energy, and the arm would swing by itself.
 Vec3 no_faster(const Vec3& omega_W, double most) noexcept {
   const double speed = omega_W.norm();
   return speed > most ? Vec3(most / speed * omega_W) : omega_W;
 }
 
-// Delay of setpoint filter and slowest drive. The delay from the proxy to the real arm is this plus two periods less
-// the lookahead.
+// Returns the delay of setpoint filter and slowest drive. The delay from the proxy to the real arm is this delay plus
+// two periods less the lookahead's horizon.
 double drives_lag_s(const std::vector<description::DriveDescription>& drives,
                     const description::CellLimits& limits) noexcept {
   const double filter_s =
@@ -85,8 +85,8 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
       arm_step_(arm, parts_.inverse, drives, settings.period_s),
       final_(arm, drives, limits, settings.period_s) {
   state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;
-  // Longest time in which the tool comes to rest: the joints brake, the tool's acceleration is limited, and the filter
-  // delays setpoints.
+  // The longest time in which the tool comes to rest: the filter's delay plus the time in which the joints brake or the
+  // limited acceleration stops the tool, whichever is longer.
   limits_work_.set_braking(
       parts_.elastic.filter().lead_s() +
       std::max(ArmStep::braking_s(drives), limits.max_tool_speed_m_per_s / limits.max_tool_acceleration_m_per_s2));
@@ -112,7 +112,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
 
 // ---- beginnings and ends
 
-// The first setpoint equals the last one before.
+// The first setpoint equals the last setpoint before start().
 void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noexcept {
   const JointVector target_rad = final_.target_rad();
   state_.freeing = beginning == Beginning::freeing;
@@ -170,7 +170,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   ahead_->proxy_filter.set_period(period_s);
 }
 
-// Another mass, damping or spring changes the predicted point; the arm moves there slowly.
+// A change of mass, damping or spring moves the predicted point; the arm then moves to the new point slowly.
 void AdmittanceMotion::set(const Change& change) noexcept {
   parts_.tool->set(change);
   if (!ahead_) return;
@@ -241,8 +241,8 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   state_.mass_kg = step.mass_kg;
   state_.damping_Ns_per_m = step.damping_Ns_per_m;
   state_.touches = step.contacts > 0;
-  state_.limited = step.limits.has(Limit::speed) && !state_.freeing;  // while it is being freed, the tool is slow on
-                                                                      // purpose
+  // While the tool is being freed, its low speed is intended.
+  state_.limited = step.limits.has(Limit::speed) && !state_.freeing;
   if (step.settled) state_.q_k2_W = state_.q_k1_W;
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.touches[0].normal_W;
@@ -260,7 +260,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   return true;
 }
 
-// Takes over the proxy's step; false if it failed.
+// Takes over the proxy's step. Returns false if the step has failed.
 bool AdmittanceMotion::take(const WorldStep& step, const MotionCycle& cycle) noexcept {
   if (step.fault != ProxyFault::none) {
     cycle.alarm.raise(step.fault == ProxyFault::squeezed ? Fault::proxy_squeezed : Fault::proxy_not_finite);
@@ -272,15 +272,16 @@ bool AdmittanceMotion::take(const WorldStep& step, const MotionCycle& cycle) noe
   return true;
 }
 
-// Lag in turning as a distance at the end of a handle, in m.
+// Returns the tool's lag in turning, as a distance at the end of a handle, in m.
 double AdmittanceMotion::turned_away_m(const Measured& measured) const noexcept {
   if (!parts_.tool->turns()) return 0.0;
   const Eigen::Quaterniond R_WT(models::Mat3(measured.R_WS * R_TS_.transpose()));
   return torque_lever_m * R_WT.angularDistance(parts_.tool->R_WT());
 }
 
-// Makes the sets of this step around the proxy. With lookahead, also those around the commanded point: the arm's
-// acceleration then limits that point, and a separate filter state limits the proxy's acceleration.
+// Makes the sets of this step around the proxy, and with lookahead also the sets around the commanded point. With
+// lookahead, the arm's filter state limits the commanded point's acceleration, and a separate filter state limits the
+// proxy's acceleration.
 void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
   const LinkFilter& filter = parts_.elastic.filter();
   const models::ToolKinematics& filtered = parts_.elastic.kinematics();
@@ -320,8 +321,8 @@ ArmStepStart AdmittanceMotion::arm_start(const LinkFilter& filter, const JointVe
   return start;
 }
 
-// Moves the tool's speed limit towards the one wanted in this cycle. While the tool stands, a lower limit applies at
-// once.
+// Moves the tool's speed limit towards the limit that is wanted in this cycle. If the tool stands, a lower limit
+// applies at once.
 void AdmittanceMotion::limit_speed(const MotionCycle& cycle) noexcept {
   const double most = limits_.max_tool_speed_m_per_s;
   double wanted = cycle.slowed ? std::min(supervision_.slow_speed_m_per_s, most) : most;
@@ -342,7 +343,7 @@ void AdmittanceMotion::count_work(const WorldStep& step) noexcept {
   work_.guarded = final_.judged_exactly();
 }
 
-// ρ² of the felt inertia and mass, tool behind the sensor included; 0 before the first step.
+// Returns ρ² = felt inertia / felt mass; both include the tool behind the sensor. Returns 0 before the first step.
 double AdmittanceMotion::gyration_m2() const noexcept {
   return state_.mass_kg > 0.0 ? parts_.tool->inertia_kg_m2() / (state_.mass_kg + tool_mass_kg_) : 0.0;
 }
@@ -386,14 +387,14 @@ void AdmittanceMotion::record_passivity(const WorldStep& step, CycleRecord& reco
 
 // ---- getting free
 
-// The part of a force that can move the tool. In an arm of few axes, which moves in a plane or line, the structure
-// carries the rest.
+// Returns the part of a force that can move the tool. If the arm has few axes and its tool moves in a plane or on a
+// line, the arm's structure carries the rest of the force.
 Vec3 AdmittanceMotion::moving_force_W(const Vec3& force_W) const noexcept {
   const models::ToolSpace& space = parts_.inverse.space();
   return space.dimensions == 3 ? force_W : Vec3(space.projection() * force_W);
 }
 
-// The tool backs off from the last touched object, or along the hand's push if nothing was touched.
+// The tool backs off from the object that it touched last, or along the hand's force if it has touched nothing.
 bool AdmittanceMotion::prepare_freeing(const Command& command, const Measured& measured) noexcept {
   if (command.order == Order::release) {
     parts_.release->start_release();
@@ -431,9 +432,10 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
 
 // ---- from the proxy to the setpoints
 
-// The arm is sent to the proxy's place after the horizon H if it coasts. With a constant hand force h the proxy would
-// be ½H²h/M further. This term is left out, because the sensor also measures the inertia of the hand's own mass: fed
-// back, it would halve the horizon at which the arm's elastic modes stay calm (figures in docs/design.md).
+// Moves the arm to the proxy. With lookahead, the arm is sent to the place that the proxy would reach within the
+// horizon H if it coasted. With a constant hand's force h the proxy would be ½H²h/M further. This term is left out,
+// because the sensor also measures the inertial force of the hand's mass: fed back, this force would halve the horizon
+// at which the arm's elastic modes stay calm (figures in docs/design.md).
 bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   if (tool().turns()) {
     cycle.record.proxy_inertia_kg_m2 = parts_.tool->inertia_kg_m2();
@@ -461,7 +463,8 @@ bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   return true;
 }
 
-// f_l: the limits' force in the proxy's step, plus the force for the displacement by the arm's step.
+// Checks whether the limits work against the hand (limits_work.hpp). f_l is the limits' force in the proxy's step plus
+// κ times the proxy's displacement by the arm's step.
 void AdmittanceMotion::judge_limits(const WorldStep& step, const Vec3& from_W, const MotionCycle& cycle) noexcept {
   if (step.settled) return;
   const double T = period_s_, kappa = step.mass_kg / (T * T) + step.damping_Ns_per_m / T;
@@ -478,7 +481,7 @@ void AdmittanceMotion::judge_limits(const WorldStep& step, const Vec3& from_W, c
   cycle.alarm.raise(Fault::works_against_hand, -1, limits_work_.push_J(), limits_work_.allowed_J());
 }
 
-// Moves the arm to q_W with the proxy's orientation. False if the pose is invalid.
+// Moves the arm to q_W with the proxy's orientation. Returns false if the pose is invalid.
 bool AdmittanceMotion::go(ArmStep& step, const Vec3& q_W, const MotionCycle& cycle) noexcept {
   if (step.go(q_W, tool().R_WT()) == ArmStep::Outcome::invalid) {
     cycle.alarm.raise(Fault::singular);
@@ -488,7 +491,7 @@ bool AdmittanceMotion::go(ArmStep& step, const Vec3& q_W, const MotionCycle& cyc
   return true;
 }
 
-// Moves the proxy to the arm's place if they differ.
+// Moves the proxy to the arm's place if the two places differ.
 void AdmittanceMotion::put_proxy_where(const ArmStep& step) noexcept {
   const Vec3& q_W = step.kinematics().X_WT.translation();
   if ((q_W - state_.q_k1_W).norm() > same_place_m) put_proxy_to(q_W, (q_W - state_.q_k2_W) / period_s_);
@@ -498,20 +501,20 @@ void AdmittanceMotion::put_proxy_to(const Vec3& q_W, const Vec3& velocity_W) noe
   state_.q_k1_W = tool().resume(q_W, velocity_W);
 }
 
-// Highest turning speed after the arm couldn't follow: the proxy's, but at least a quarter of the limit, since joints
-// can't stop at once.
+// Returns the highest turning speed with which the proxy continues after the arm couldn't follow. It is the proxy's
+// turning speed so far, but at least a quarter of the limit, since joints can't stop at once.
 double AdmittanceMotion::most_turning_rad_per_s() const noexcept {
   return std::max(tool().omega_W().norm(), 0.25 * limits_.max_turning_speed_rad_per_s);
 }
 
-// The proxy continues from the orientation that the arm has reached.
+// Lets the proxy continue from the orientation that the arm has reached. `from`: the arm's orientation before its step.
 void AdmittanceMotion::turn_on_from(const ArmStep& step, const Eigen::Quaterniond& from) noexcept {
   const Vec3 turn = models::rotation_vector(step.R_WT() * from.conjugate());
   const Vec3 omega_W = no_faster(turn / period_s_, most_turning_rad_per_s());
   state_.q_k1_W = tool().turn_on(step.R_WT(), omega_W, state_.q_k1_W, (state_.q_k1_W - state_.q_k2_W) / period_s_);
 }
 
-// Limits of turning for judging setpoints. Slowing the tool doesn't lower them.
+// Returns the limits of turning by which setpoints are judged. A lowered speed limit of the tool doesn't lower them.
 TurnSets AdmittanceMotion::turn_limits() const noexcept {
   TurnSets sets = tool().sets().sent();
   sets.max_speed_rad_per_s = std::max(sets.max_speed_rad_per_s, limits_.max_turning_speed_rad_per_s);
@@ -536,8 +539,8 @@ void AdmittanceMotion::send(const Measured& measured) noexcept {
   if (result.differs) go_on_from_setpoints(result.blocked);
 }
 
-// Filter, arm and proxy continue from the commanded setpoints. The setpoint of a blocked joint may have moved fast;
-// that joint continues at rest.
+// Lets filter, arm and proxy continue from the commanded setpoints. The setpoint of a blocked joint may have moved
+// fast, so a blocked joint continues at rest.
 void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   const JointVector speed = final_.go_on_from_here(blocked);
   parts_.elastic.resume(final_.target_rad(), speed);
@@ -551,8 +554,8 @@ void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   if (ahead_) {
     ahead_->proxy_step.resume(arm_step_.link_rad() - ahead_s() * speed, period_s_ * speed);
     ahead_->proxy_filter.resume(filter.rad() - ahead_s() * speed, speed);
-    // With constant joint speeds the tool moves along a curve. If the proxy weren't at the place of its arm step,
-    // the next cycle would move it there.
+    // With constant joint speeds the tool moves along a curve. So the proxy is put to the place of proxy_step;
+    // otherwise the next cycle would move the proxy to this place.
     const Vec3 c_W = q_W;
     q_W = ahead_->proxy_step.kinematics().X_WT.translation();
     ahead_->point.resume(c_W, q_W, velocity_W);

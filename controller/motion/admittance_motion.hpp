@@ -1,16 +1,16 @@
-// Motion of the admittance type: the hand's force moves a proxy, and the arm follows the proxy.
+// Makes the motion of the admittance type: the hand's force moves a proxy, and the arm follows the proxy.
 //
 //   hand's wrench ─▶ proxy (26) in the scene, within what the arm can follow ─▶ step of the arm ─▶ elastic gears ─▶
 //   (hand_judge.hpp)  (rendering/)            (arm_step/)                       (arm_step.hpp)   (elastic_setpoint.hpp)
 //   ─▶ final setpoints
 //   (final_setpoints.hpp)
 //
-// The limits of a step contain only places that the arm can reach, so the arm is sent to the proxy itself. With
-// lookahead it is sent to the proxy's predicted position (sent_point.hpp). A second arm step then keeps the proxy where
-// an arm sent to it could follow. Records and reports describe the proxy.
+// The limits of a step contain only places that the arm can reach, so the arm is sent to the proxy's place. With
+// lookahead the arm is sent to the proxy's predicted place (sent_point.hpp). A second arm step then keeps the proxy at
+// places that the arm could reach if it were sent to the proxy. Records and reports describe the proxy.
 //
 // If a drive doesn't follow or a guard holds a setpoint back, the motion continues from the commanded setpoints
-// (go_on_from_setpoints()) and doesn't catch up later.
+// (go_on_from_setpoints()). It doesn't catch up with the wanted setpoints later.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ namespace proxarm::controller {
 
 class AdmittanceMotion final : public Motion {
  public:
-  // `arm` must outlive this.
+  // Precondition: `arm` outlives this object.
   AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm, std::vector<description::DriveDescription> drives,
                    const description::CellLimits& limits, const description::SupervisionDescription& supervision,
                    const SessionSettings& settings, const HeldTool& tool = {});
@@ -71,26 +71,26 @@ class AdmittanceMotion final : public Motion {
   void archive(fieldbus::StateArchive& state) noexcept override;
 
  private:
-  // State from cycle to cycle. Proxy, arm step, filter and setpoints keep their own histories.
+  // The state that isn't contained in proxy, arm step, filter or setpoints.
   struct State {
-    models::Vec3 q_k1_W = models::Vec3::Zero();         // proxy of the last cycle
-    models::Vec3 q_k2_W = models::Vec3::Zero();         // proxy of the cycle before
+    models::Vec3 q_k1_W = models::Vec3::Zero();         // the proxy's place after the last cycle
+    models::Vec3 q_k2_W = models::Vec3::Zero();         // the proxy's place one cycle before q_k1_W
     double speed_limit_m_per_s = 0.0;                   // present speed limit of the tool
     models::Vec3 last_normal_W = models::Vec3::Zero();  // normal of the last contact; zero: none yet
-    double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // of the proxy's last step
+    double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // the proxy's, in its last step
     bool touches = false;                               // the proxy's last step ended in contact
-    bool limited = false;                               // the tool's speed limit acted in that step
+    bool limited = false;                               // the tool's speed limit acted in the proxy's last step
     bool freeing = false;                               // release, back-off or yield: the tool moves without the scene
   };
-  // With lookahead: the commanded point, and an arm step as if the arm were sent to the proxy.
+  // For lookahead: the commanded point, and an arm step and filter as if the arm were sent to the proxy.
   struct Ahead {
     SentPoint point;
     ArmStep proxy_step;
     LinkFilter proxy_filter;
-    StepLimits limits;  // around the point
+    StepLimits limits;  // around the commanded point
   };
 
-  // While the tool is being freed, it is a point without a scene.
+  // The moving tool: a point without a scene while the tool is being freed, else the tool in the scene.
   [[nodiscard]] RenderedTool& tool() const noexcept {
     if (state_.freeing) return parts_.release->tool();
     return *parts_.tool;
@@ -112,7 +112,7 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] double most_turning_rad_per_s() const noexcept;
   [[nodiscard]] double turned_away_m(const Measured& measured) const noexcept;
   [[nodiscard]] models::Vec3 moving_force_W(const models::Vec3& force_W) const noexcept;
-  // The present lookahead; 0 while the tool is being freed, since nobody feels a mass then.
+  // The present horizon of the lookahead; 0 while the tool is being freed, since nobody feels a mass then.
   [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : ahead_->point.horizon_s(); }
   void count_work(const WorldStep& step) noexcept;
   void observe_hand(const Measured& measured) noexcept;
@@ -125,17 +125,18 @@ class AdmittanceMotion final : public Motion {
   description::CellLimits limits_;
   description::SupervisionDescription supervision_;
   double period_s_, tool_mass_kg_;
-  double drives_lag_s_, horizon_s_;             // for the hand judge: delay of filter and drives, lookahead
+  // drives_lag_s_: delay of setpoint filter and slowest drive. horizon_s_: horizon of the lookahead.
+  double drives_lag_s_, horizon_s_;
   models::Mat3 R_TS_;                           // orientation of the sensor in the tool
   std::optional<PassivityObserver> passivity_;  // nullopt: switched off
   HandJudge hand_;
   StepLimiter limiter_;
-  ArmStep arm_step_;  // for the angles that are commanded
+  ArmStep arm_step_;  // makes the commanded angles
   std::unique_ptr<Ahead> ahead_;
   std::optional<GearDamping> gear_damping_;  // nullopt: no gear torque is measured, or damping is off
   FinalSetpoints final_;
   LimitsWork limits_work_;
-  StepLimits step_limits_;  // this cycle's, around the proxy
+  StepLimits step_limits_;  // limits of this cycle's step, around the proxy
   State state_;
   MotionWork work_;
 };

@@ -1,4 +1,5 @@
-// All objects that a cycle works on, built and configured before the first one (session/bring_up.hpp).
+// Defines the objects on which every cycle works; session/bring_up.hpp builds and configures them before the first
+// cycle.
 #pragma once
 
 #include <array>
@@ -32,11 +33,11 @@ struct DriveOnBus {
 
   std::unique_ptr<fieldbus::CyclicDrive> owned;
   fieldbus::CyclicDrive& drive;  // *owned
-  std::size_t bus;               // index in the network; no_bus: on a Modbus line
+  std::size_t bus;               // index of the drive's bus in the network; no_bus: the drive is on a Modbus line
 };
 
-// The first drive that takes no setpoints after its time limit (enable_timeout_s of the cell's drive, or usual_s);
-// drive −1: none. `following`: bits of the drives that take setpoints.
+// The first drive that takes no setpoints after its time limit limit_s: enable_timeout_s of the cell's drive, or
+// usual_s. drive = −1: there is no such drive. `following`: bits of the drives that take setpoints.
 struct OverdueDrive {
   int drive = -1;
   double limit_s = 0.0;
@@ -44,7 +45,7 @@ struct OverdueDrive {
 [[nodiscard]] OverdueDrive first_overdue(const std::vector<DriveOnBus>& drives, std::uint8_t following, double waited_s,
                                          double usual_s) noexcept;
 
-// A bus with drives, which get SYNC and the controller's heartbeat.
+// A bus with drives, to which SYNC and the controller's heartbeat are sent.
 struct DriveBus {
   std::size_t bus;
   fieldbus::SyncProducer sync;
@@ -56,7 +57,7 @@ struct AdmittanceParts {
   models::InverseKinematics inverse;
   ElasticSetpoint elastic;
   std::unique_ptr<RenderedTool> tool;
-  std::optional<LinkMotion> links;  // for the passivity observer of a tool that turns
+  std::optional<LinkMotion> links;  // used by the passivity observer if the tool turns
   std::unique_ptr<Release> release;
 };
 
@@ -64,21 +65,22 @@ struct AdmittanceParts {
 struct CycleParts {
   fieldbus::CanNetwork& network;
   std::vector<DriveOnBus> drives;
-  std::vector<fieldbus::DriveSlot> can_drives;  // the drives on CAN; all drives if they take torques
+  std::vector<fieldbus::DriveSlot> can_drives;  // the drives on CAN; all drives if drives take torques
   std::vector<DriveBus> drive_buses;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
-  std::size_t sensor_bus;  // DriveOnBus::no_bus: on a Modbus line
-  std::vector<std::unique_ptr<fieldbus::ModbusLine>>
-      modbus_lines;                  // declared after drives and sensor, so that its threads end first
-  std::unique_ptr<models::Arm> arm;  // on the heap: others keep references to it
-  std::variant<AdmittanceParts, std::unique_ptr<TorqueRendering>> rendering;  // the alternative is the session's type
+  std::size_t sensor_bus;  // index of the sensor's bus; DriveOnBus::no_bus: the sensor is on a Modbus line
+  // Declared after drives and sensor, so that the lines' threads end before drives and sensor are destroyed.
+  std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines;
+  std::unique_ptr<models::Arm> arm;  // the arm is on the heap, because other objects keep references to it
+  // The alternative decides the session's type: admittance or impedance.
+  std::variant<AdmittanceParts, std::unique_ptr<TorqueRendering>> rendering;
   WrenchCompensation compensation;
-  description::ToolDescription tool;  // behind the sensor
+  description::ToolDescription tool;  // the tool behind the sensor
   std::optional<EnablingInput> enabling;
   description::SupervisionDescription supervision;
 };
 
-// Largest step of each joint in a cycle, at its drive's maximum speed.
+// Returns the largest step of each joint in a cycle: the joint moves at the maximum speed of its drive.
 std::array<double, models::max_axes> max_steps_rad(const std::vector<description::DriveDescription>& drives,
                                                    double period_s) noexcept;
 

@@ -46,7 +46,8 @@ FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const 
   return result;
 }
 
-// Lag of the joint that holds the tool back most, converted to the joint with the longest lever.
+// Returns the lag of the joint that holds the tool back most, converted to an angle of the joint with the longest
+// lever.
 double FinalSetpoints::lag_rad() const noexcept { return guard_.lag_rad().cwiseAbs().cwiseProduct(lever_).maxCoeff(); }
 
 JointVector FinalSetpoints::go_on_from_here(std::uint8_t blocked) noexcept {
@@ -54,7 +55,7 @@ JointVector FinalSetpoints::go_on_from_here(std::uint8_t blocked) noexcept {
   return guard_.speed_rad_per_s();
 }
 
-// Without bounds: for braking, which was judged before.
+// Applies the guards of joints and tool. `bounds` null: for braking, whose setpoints were judged before it began.
 ActiveLimits FinalSetpoints::guard(const JointVector& wanted_rad, const Bounds* bounds, bool& held_back) noexcept {
   ActiveLimits active = guard_.step(wanted_rad);
   const ActiveLimits by_tool =
@@ -68,7 +69,7 @@ ActiveLimits FinalSetpoints::guard(const JointVector& wanted_rad, const Bounds* 
   return active;
 }
 
-// The braking time is the longest that any joint needs at its own deceleration.
+// The braking time is the longest time that a joint needs at its maximum deceleration.
 void FinalSetpoints::start_run_out() noexcept {
   double stop_s = period_s_;
   for (Eigen::Index i = 0; i < guard_.speed_rad_per_s().size(); ++i) {
@@ -85,18 +86,22 @@ ActiveLimits FinalSetpoints::run_out() noexcept {
   return guard(guard_.target_rad() + state_.run_out_share * period_s_ * state_.run_out_rad_per_s, nullptr, held_back);
 }
 
-// Returns the joints whose drives are blocked, as bits. The setpoint of a blocked drive stays close to its reported
-// position, and all other joints wait. So gears wind up little, and nothing snaps when the drive comes free. The
-// allowed distance grows with speed: a drive that follows reports its setpoint late, by the way there and back.
+// Finds the joints whose drives are blocked, and returns them as bits. The setpoint of a blocked drive stays close to
+// the drive's reported position, and all other joints wait. So gears wind up little, and nothing snaps when the drive
+// comes free. The allowed distance between setpoint and reported position grows with speed, since a drive that follows
+// reports its position late, by the delay of setpoint and report.
 //
-// A false report must not move the setpoint. Let θ be the report, r the allowed distance, w the wanted setpoint and [l,
-// h] the envelope of the setpoints sent before the joint was blocked (setpoint_envelope.hpp). The command is
+// A false report must not move the setpoint. θ: the reported position. r: the allowed distance. w: the wanted setpoint.
+// [l, h]: the envelope of the setpoints that were sent before the joint was blocked (setpoint_envelope.hpp). The
+// commanded setpoint is
 //     c = clamp(clamp(w, θ − r, θ + r), min(l, w), max(h, w))
-// If the joint has jammed, θ is between l and h, so c = θ ± r: the setpoint brakes and returns to the joint. If θ is
-// outside, the report is false, and c is w or a place to which the joint was sent before. With nobody at the handle,
-// proxy and filter continue from the last setpoint, so l = h = w = c stays constant for any θ. With a hand, c goes no
-// further than w, which the hand has made. So no sequence of reports moves the arm by more than it moved within the
-// lag, and without a hand not at all.
+//   1. If the joint has jammed, θ is between l and h, so c = θ ± r: the setpoint brakes and returns to the joint.
+//   2. If θ isn't between l and h, the report is false, and c is w or a place to which the joint was sent before.
+//   3. With nobody at the handle, proxy and filter continue from the last setpoint, so l = h = w = c stays constant for
+//      any θ.
+//   4. With a hand, c goes no further than w, which follows from the hand's force.
+// So no sequence of reports moves the arm by more than it has moved within the drive's lag, and without a hand no
+// sequence of reports moves it.
 std::uint8_t FinalSetpoints::find_blocked(const JointVector& motor_rad, const Measured& measured,
                                           JointVector& wanted_rad) const noexcept {
   std::uint8_t blocked = 0;

@@ -1,5 +1,6 @@
-// The one place where setpoints become final, in all phases: first drives that don't follow, then the joints' limits
-// (joint_guard.hpp), then those of tool and elbow (tool_guard.hpp). Neither allocates, locks nor throws.
+// Makes the final setpoints from the wanted ones, in all phases of a session. Three changes follow one another: for
+// drives that don't follow, for the joints' limits (joint_guard.hpp), and for the limits of tool and elbow
+// (tool_guard.hpp). Nothing allocates, locks or throws.
 #pragma once
 
 #include <array>
@@ -32,22 +33,24 @@ class FinalSetpoints {
     ActiveLimits limits;       // limits that held a setpoint back
     std::uint8_t blocked = 0;  // joints whose drives don't follow, as bits
     bool guarded = false;      // the tool guard held a setpoint back
-    // The wanted setpoints can't be caught up; the motion must continue from the commanded ones. A small lag is caught
-    // up instead: to continue from setpoints takes the motors' angles for the links' and would shake the tool. A lag is
-    // small if it moves the tool no further than limits.following_error_rad of the joint with the longest lever.
+    // The commanded setpoints can't catch up with the wanted setpoints, so the motion must continue from the commanded
+    // ones. They catch up if the lag is small. Reason: a motion that continues from setpoints takes the motors' angles
+    // for the links' angles, which shakes the tool. The largest small lag moves the tool as far as a lag of
+    // limits.following_error_rad at the joint with the longest lever.
     bool differs = false;
   };
   struct Bounds {
     double max_speed_m_per_s;  // the tool's present speed limit
-    models::Vec3 links_W;      // the tool's place by the links, which the motors lead
-    const TurnSets* turn;      // limits of turning; null: not judged
+    models::Vec3 links_W;      // the tool's place by the link angles, which the motor angles lead
+    const TurnSets* turn;      // limits of turning; null: turning isn't judged
   };
-  // One period towards these motor angles.
+  // Moves the setpoints one period towards the wanted ones, motor_rad.
   Result step(const models::JointVector& motor_rad, const Measured& measured, const Bounds& bounds) noexcept;
-  // Call after a step that differs: the next wanted setpoints count from here. Returns the motor speeds, rad/s.
+  // Call after a step whose result `differs`: the next wanted setpoints continue from the commanded ones. Returns the
+  // motor speeds, rad/s.
   models::JointVector go_on_from_here(std::uint8_t blocked) noexcept;
 
-  // Begins to brake all joints to rest: each decelerates from its last speed, all in the same time.
+  // Begins to brake all joints to rest. Each joint decelerates evenly from its last speed; all joints stop together.
   void start_run_out() noexcept;
   ActiveLimits run_out() noexcept;
   [[nodiscard]] bool has_run_out() const noexcept { return state_.run_out_share <= 0.0 && guard_.at_rest(); }
@@ -57,14 +60,14 @@ class FinalSetpoints {
   }
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return guard_.target_rad(); }
   [[nodiscard]] bool at_rest() const noexcept { return guard_.at_rest(); }
-  // Number of setpoints near a bound, judged exactly by the tool guard.
+  // Number of setpoints near a bound, which the tool guard judged exactly.
   [[nodiscard]] std::uint64_t judged_exactly() const noexcept { return tool_guard_.judged_exactly(); }
   void archive(fieldbus::StateArchive& state) noexcept;
 
  private:
   struct State {
     models::JointVector run_out_rad_per_s;  // each joint's speed when the run-out began
-    double run_out_share = 1.0;             // remaining share of that speed
+    double run_out_share = 1.0;             // remaining share of run_out_rad_per_s
     double run_out_per_cycle = 1.0;         // decrease of the share per cycle
   };
 
@@ -79,8 +82,10 @@ class FinalSetpoints {
   double period_s_;
   JointGuard guard_;
   ToolGuard tool_guard_;
-  models::JointVector lever_;  // of each joint: largest distance of the tool from its axis, relative to the longest
-  SetpointEnvelope envelope_;  // of the setpoints; frozen for blocked joints
+  // For each joint: the tool's largest distance from the joint's axis, divided by the largest such distance of all
+  // joints.
+  models::JointVector lever_;
+  SetpointEnvelope envelope_;  // envelope of the setpoints; frozen for blocked joints
   State state_;
 };
 

@@ -76,7 +76,7 @@ void HandJudge::let_in(CycleRecord& record) noexcept {
   record.set(RecordFlag::ramp_in, share_ < 1.0);
 }
 
-// Checks whether a hand can have made this force, given the motion after it.
+// Raises a fault if no hand can have made the force, given the motion that follows it.
 void HandJudge::judge(const MotionCycle& cycle, const ProxyMotion& proxy, bool empty) noexcept {
   const SensorBias& bias = cycle.measured.bias;
   const ForceAndMotion now{.force_W = hand_.wrench_W().force,

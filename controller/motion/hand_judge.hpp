@@ -1,9 +1,9 @@
-// The hand's wrench on the proxy, and the check whether a hand can have made it.
+// Computes the hand's wrench on the proxy, and checks whether a hand can have made this wrench.
 //
-// The check uses the wrench without the tool's inertia (handle/hand_force.hpp). After a start the wrench rises from
-// zero over ramp_in_s. If nobody holds the handle, a braking force replaces it (handle/empty_handle.hpp). Forces that
-// don't match the motion after them raise faults (handle/force_plausibility.hpp). No allocation, lock or throw after
-// construction.
+// The check uses the wrench without the tool's inertia (handle/hand_force.hpp). After a start the wrench on the proxy
+// rises from zero over ramp_in_s. If nobody holds the handle, a braking force replaces the hand's wrench
+// (handle/empty_handle.hpp). Forces that a hand can't have made, by the motion that follows them, raise faults
+// (handle/force_plausibility.hpp). Nothing allocates, locks or throws after construction.
 #pragma once
 
 #include <optional>
@@ -22,20 +22,20 @@ struct ProxyMotion {
   models::Vec3 q_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();
   double mass_kg = 0.0, damping_Ns_per_m = 0.0;
   bool touches = false;
-  bool limited = false;                                  // by the tool's speed limit
+  bool limited = false;                                  // the tool's speed limit held the proxy back
   models::Vec3 braking_torque_W = models::Vec3::Zero();  // brings the tool's turning to rest
 };
 
-// The hand's wrench and the tare's noise, for a proxy or device of this velocity and mass. Precondition: `hand_W` and
-// `v_W` outlive the result.
+// Returns the signs of a hand for EmptyHandle: the hand's wrench, the tare's noise, and the velocity and mass of the
+// proxy or device. Precondition: `hand_W` and `v_W` outlive the result.
 [[nodiscard]] HandSigns hand_signs(const models::Wrench& hand_W, const SensorBias& bias, const models::Vec3& v_W,
                                    double mass_kg, bool at_handle) noexcept;
 
 struct HandJudgeConfig {
   HeldTool tool;
-  double lever_m = 0.0;      // a torque counts as the force that makes it at this lever; 0: the orientation is held
+  double lever_m = 0.0;      // lever that converts a torque to a force; 0: torques don't count
   double lag_s = 0.0;        // delay from the proxy to the real arm
-  bool always_held = false;  // by a hand or a load: no force counts as a bias
+  bool always_held = false;  // a hand or a load always holds the handle, so no force counts as a bias
 };
 
 class HandJudge {
@@ -45,7 +45,7 @@ class HandJudge {
   void set_period(double period_s, double lag_s) noexcept;
   void set_tool(const HeldTool& tool) noexcept;
   void start() noexcept;
-  // The wrench on the proxy in this cycle. Raises faults and sets flags in `cycle`.
+  // Returns the wrench on the proxy in this cycle. Raises faults and sets flags in `cycle`.
   [[nodiscard]] models::Wrench step(const MotionCycle& cycle, const ProxyMotion& proxy) noexcept;
 
   // See Motion.
@@ -64,9 +64,9 @@ class HandJudge {
   description::SupervisionDescription supervision_;
   double period_s_;
   bool always_held_;
-  double share_ = 1.0;  // share of the hand's wrench, during the ramp-in
+  double share_ = 1.0;  // share of the hand's wrench that acts on the proxy; rises during the ramp-in
   HandForce hand_;
-  std::optional<EmptyHandle> empty_;  // nullopt: the proxy coasts
+  std::optional<EmptyHandle> empty_;  // nullopt: the proxy isn't braked when nobody holds the handle
   ReversedForce reversed_;
   StraightForce straight_;
 };

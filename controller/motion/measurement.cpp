@@ -7,19 +7,19 @@ namespace proxarm::controller {
 namespace {
 
 // The bias follows the reading at rest with the time constant bias_s, at most at bias_N_per_s. A sensor that warms up
-// drifts by 0.01 N/s. A hand that presses harder by less than 0.35 N per second counts as drift, up to
-// max_bias_drift_N.
+// drifts by 0.01 N/s. A hand whose force grows by less than 0.35 N/s counts as drift, up to max_bias_drift_N.
 constexpr double bias_s = 0.35, bias_N_per_s = 0.35;
-// A torque's bias counts as the force that makes it at this lever, about a handle's length.
+// Lever that converts the bias of a torque to a bias of a force: about a handle's length.
 constexpr double bias_lever_m = 0.1;
-// Largest accepted jump during the tare, a part of which enters the bias. A smaller one moves an empty handle by 24 mm
-// at most (hand_force.hpp).
+// Largest accepted jump during the tare, a part of which enters the bias. A smaller jump moves an empty handle by 24 mm
+// at most.
 constexpr double least_tare_jump_N = 0.3;
-// Largest spread of readings that aren't white noise, for a zero that is stored for later.
+// If the readings aren't white noise, their largest spread for a zero that is to be stored.
 constexpr double most_kept_N = 0.3;
-// Uncertainty of the tare's mean, in its standard deviations.
+// Uncertainty of the tare's mean, as a multiple of the mean's standard deviation.
 constexpr double tare_deviations = 4.0;
-// Without noise the tool's pose remains uncertain, by half a milliradian: 2 mN of the weight of half a kilogram.
+// Smallest uncertainty of the tare, even without noise: the tool's orientation is uncertain by half a milliradian,
+// which changes the weight of half a kilogram by 2 mN.
 constexpr double least_open_N = 2e-3;
 
 }  // namespace
@@ -50,7 +50,8 @@ void Measurement::take() noexcept {
   read_sensor();
 }
 
-// Only joints whose speed the tool guard bounds (tool_guard.hpp); the first two hardly move.
+// Computes elbow_moved_m from the joints whose speed the tool guard bounds (tool_guard.hpp). The places of the first
+// two joints hardly move.
 void Measurement::place_elbow() noexcept {
   constexpr std::size_t first_joint = 2;
   const auto before_W = points_.joint_W;
@@ -140,7 +141,7 @@ bool Measurement::tare(const SessionSettings& settings, double tared_for_s, Alar
   return false;
 }
 
-// Allowed difference between the tared zero and the known one.
+// Returns the allowed difference between the tare's mean and the known zero.
 double Measurement::standing_limit_N(const SessionSettings& settings) const noexcept {
   return settings.zero_drift_N + tare_error_N();
 }

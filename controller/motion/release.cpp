@@ -8,7 +8,7 @@ namespace {
 
 using models::Vec3;
 
-// A remaining distance below this counts as zero; it is one or two counts of an encoder.
+// A remaining distance below this, one or two counts of an encoder, counts as zero.
 constexpr double arrived_m = 1e-5;
 
 SessionSettings plain(SessionSettings settings) {
@@ -44,7 +44,7 @@ Vec3 Release::force_W(const Vec3& q_W, const Vec3& v_W, const Vec3& hand_W) cons
   Vec3 v = (v_W + T / M * hand_W) / (1.0 + b * T / M);
   if (backs_off()) {
     const double a = acceleration_m_per_s2, left = std::max(0.0, left_m(q_W));
-    // The second term makes the motion arrive within this cycle.
+    // At the speed left / T the motion arrives within this cycle.
     const double brake = std::min(std::sqrt(2.0 * a * left), left / T);
     v = std::min({speed_m_per_s_, n_W_.dot(v_W) + a * T, brake}) * n_W_;
   }

@@ -1,13 +1,13 @@
 // Frees a person who is pinned: from a hold, the tool moves slowly, without the scene and within all limits.
 //
-//   release    M v̇ = h − b v: the arm follows the hand's force; 10 N give 0.05 m/s
-//   back off   along a direction n at v = √(2 a r), r: remaining distance; at most at the speed allowed
-//   yield      backs off along the force that stopped the arm, as the tool may be pressing on somebody, until little of
-//              that force is left. If it doesn't fall within the first 5 mm, the tool presses nothing elastic (the
-//              sensor reads wrongly, or a hand pulls), and yielding ends.
+//   release    The arm follows the hand's force h: M v̇ = h − b v. 10 N give 0.05 m/s.
+//   back off   The tool moves along a direction n at v = √(2 a r), at most at the allowed speed. r: remaining distance.
+//   yield      The tool, which may be pressing on somebody, backs off along the force that stopped the arm. Yielding
+//              ends when little of this force is left. It also ends if the force doesn't fall within the first 5 mm:
+//              the tool then presses on nothing elastic; the sensor reads wrongly, or a hand pulls.
 //
-// Each computes the next velocity v. (26) in free space reaches it with B = K_v = 0 and the force h = M (v − v₁)/T (v₁:
-// the last velocity), so that all limits apply as in rendering.
+// Each of these computes the tool's next velocity v. The proxy reaches v in free space by (26) with B = K_v = 0 and the
+// force h = M (v − v₁)/T, where v₁ is the last velocity. So all limits apply as in rendering.
 #pragma once
 
 #include <memory>
@@ -22,15 +22,17 @@ namespace proxarm::controller {
 
 class Release {
  public:
-  static constexpr double mass_kg = 10.0;               // M; with b a time constant of 50 ms
+  static constexpr double mass_kg = 10.0;               // M; the time constant M/b is 50 ms
   static constexpr double damping_Ns_per_m = 200.0;     // b
-  static constexpr double acceleration_m_per_s2 = 0.5;  // a, when backing off: speeding up and braking
+  static constexpr double acceleration_m_per_s2 = 0.5;  // a, for speeding up and for braking while backing off
   static constexpr double resisted_N = 50.0;            // backing off ends when the hand's resistance has risen by this
   static constexpr double longest_back_off_m = 0.2;
   static constexpr double longest_yield_m = 0.02;
   static constexpr double yielded_N = 20.0;      // yielding ends below this force
   static constexpr double relief_way_m = 0.005;  // distance within which the force must fall
-  static constexpr double relief_share = 0.15;   // by this share: 500 N by 75 N; against 10 N/mm it falls by 50 N only
+  // Share by which the force must fall: 500 N by 75 N. If the tool presses on an object of 10 N/mm, the force falls by
+  // only 50 N.
+  static constexpr double relief_share = 0.15;
 
   Release(const SessionSettings& settings, const OrientationConfig& orientation, double speed_m_per_s);
 
@@ -49,11 +51,11 @@ class Release {
   void start_yield(const models::Vec3& start_W, const models::Vec3& force_W) noexcept;
   [[nodiscard]] bool backs_off() const noexcept { return distance_m_ > 0.0; }
 
-  // The force for the proxy's next step. q, v: the proxy's.
+  // Returns the force for the proxy's next step. q_W, v_W: the proxy's place and velocity.
   [[nodiscard]] models::Vec3 force_W(const models::Vec3& q_W, const models::Vec3& v_W,
                                      const models::Vec3& hand_W) const noexcept;
-  // Backing off ends when the distance is covered or the hand resists. Yielding also ends when little force is left, or
-  // if the force doesn't fall.
+  // Whether the motion has ended. Backing off ends when the distance is covered or the hand resists. Yielding also ends
+  // when little force is left, or if the force doesn't fall.
   [[nodiscard]] bool over(const models::Vec3& q_W, const models::Vec3& hand_W) const noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -69,8 +71,8 @@ class Release {
   double period_s_, speed_m_per_s_;
   models::Vec3 start_W_ = models::Vec3::Zero(), n_W_ = models::Vec3::UnitX();
   double distance_m_ = 0.0;  // distance to back off; 0: release
-  double against_N_ = 0.0;   // hand's force against the motion, at the start of backing off
-  double pressed_N_ = 0.0;   // force along the motion, at the start of yielding; 0: not yielding
+  double against_N_ = 0.0;   // the hand's force against the motion when backing off began
+  double pressed_N_ = 0.0;   // the force along the motion when yielding began; 0: not yielding
 };
 
 }  // namespace proxarm::controller

@@ -1,4 +1,4 @@
-// The setpoints that a motion makes and the drives receive.
+// Defines the setpoints that a motion makes and the drives receive.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace proxarm::controller {
 
-// In the order of the joints: motor angles or joint torques.
+// Motor angles or joint torques, in the order of the joints.
 struct Setpoints {
   enum class Kind : std::uint8_t { angles_rad, torques_Nm };
   Kind kind = Kind::angles_rad;

@@ -11,12 +11,12 @@ using models::Wrench;
 
 // A hand feels a force that changes by 2 N/s as a gradual change, not a jerk, and yields to it.
 constexpr double shortest_fade_s = 1.0, fade_N_per_s = 2.0, fade_Nm_per_s = 0.2;
-// A torque counts as the force that makes it at this lever, a handle's length.
+// Lever that converts the uncertainty of a force to that of a torque: a handle's length.
 constexpr double torque_lever_m = 0.1;
-// Figures are accepted if they explain at least this share of the unexplained reading.
+// New figures are accepted if they explain at least this share of the reading that the present figures don't explain.
 constexpr double explained_share = 0.5;
 
-// Largest accepted reading after the change. A change below the uncertainty is always accepted.
+// Returns the largest accepted reading after the change. A change below the uncertainty `open` is always accepted.
 double most_read(const Vec3& read, const Vec3& change, double open) noexcept {
   if (change.norm() <= open) return read.norm() + open;
   return std::max(open, explained_share * read.norm());
@@ -60,7 +60,7 @@ ToolDoubt ToolEvidence::doubt(const HeldTool& from, const HeldTool& to) const no
   if (!confirmed && force_N > most_N) return {Why::force, force_N, most_N};
   const double torque_Nm = (hand_S.torque + by.torque).norm();
   const double most_Nm = most_read(hand_S.torque, by.torque, open_N * torque_lever_m);
-  // A zero confirms the mass, but not the centre.
+  // The remembered zero confirms the mass, but not the centre of mass.
   if (torque_Nm <= most_Nm || (confirmed && to.centre_S == from.centre_S)) return {};
   return {Why::torque, torque_Nm, most_Nm};
 }

@@ -13,17 +13,19 @@ using models::Vec3;
 
 namespace {
 
-// Allowed weight error as a share of max_torque_Nm: 0.36 Nm with models/cells/light.yaml, 0.7 N at its handle; a
-// drive's friction is some tenths of that.
+// Allowed error of the weight's torque as a share of max_torque_Nm. With models/cells/light.yaml it is 0.36 Nm, 0.7 N
+// at the handle. A drive's friction is some tenths of 0.36 Nm.
 constexpr double missing_share = 0.02;
-// The hold settles within 50 ms; the tare takes 0.2 s.
+// Time constant of the low-pass for τ_0. The held joints settle within 50 ms; the tare takes 0.2 s.
 constexpr double missing_filter_s = 0.05;
-// An encoder step of 8 µrad is 7 mm/s at 0.9 m and 1 kHz; filtered, 0.7 mm/s.
+// Time constant of the low-pass for the tool's velocity. An encoder step of 8 µrad changes the velocity by 7 mm/s at
+// 0.9 m and 1 kHz, and by 0.7 mm/s behind the low-pass.
 constexpr double speed_filter_s = 0.01;
 // Mass that may remain at the handle without a holding hand, such as a limp hand or a strap. While the device brakes,
-// its inertia doesn't count as a hand's force.
+// the inertial force of this mass doesn't count as a hand's force.
 constexpr double left_kg = 0.5;
-// A proxy with a mass coasts. A released light device is slow, and its friction, not its mass, ends the motion.
+// Factor on the distances after which the handle counts as empty. The full distances are for a proxy, which coasts by
+// its mass. A light device that is let go is slow, and its friction ends the motion.
 constexpr double way_share = 0.5;
 
 }  // namespace
@@ -49,7 +51,7 @@ TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const mod
                  period_s);
 }
 
-// The device is held where it stands when the first drive is enabled and its brake opens.
+// The joints are held at their angles at the time when the first drive is enabled and opens its brake.
 void TorqueMotion::wait_for_drives(const Measured& measured) noexcept {
   if (measured.following == 0) rendering_->anchor(measured.link_rad);
   hold(measured, 1.0);
@@ -75,7 +77,8 @@ std::optional<MissingWeight> TorqueMotion::missing_weight() const noexcept {
   return {};
 }
 
-// Least-squares force at the tool for the missing torques, (J Jᵀ)⁻¹ J τ_0; smaller near singular J.
+// Returns the size of the force at the tool that fits the missing torques by least squares, (J Jᵀ)⁻¹ J τ_0. Near a
+// singular J the result is smaller.
 double TorqueMotion::missing_force_N(const JointVector& link_rad) noexcept {
   constexpr double least_lever_m = 0.01;
   arm_.kinematics(link_rad, kinematics_);
@@ -98,7 +101,7 @@ void TorqueMotion::start(const Measured& measured, Beginning /*beginning*/) noex
   if (empty_) empty_->start();
 }
 
-// A device that a hand drives back must not run away; its joints' maximum speeds bound it.
+// Renders only if no joint exceeds its maximum speed, so that a device that the hand moves can't run away.
 bool TorqueMotion::render(const MotionCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   for (Eigen::Index i = 0; i < measured.axes(); ++i) {
@@ -120,7 +123,8 @@ bool TorqueMotion::render(const MotionCycle& cycle) noexcept {
   return true;
 }
 
-// Speed bound of the tool: falls from the tool's own speed to zero while nobody holds the handle.
+// Returns the bound of the tool's speed. While nobody holds the handle, this bound falls from the tool's speed to zero;
+// otherwise the bound is infinite.
 double TorqueMotion::largest_tool_speed(const MotionCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   State& s = state_;

@@ -1,17 +1,18 @@
-// Motion of the impedance type: joint torques computed from the tool's position (torque_rendering.hpp). Before
-// rendering, torques hold the joints in place. The drives stop by themselves, ramping any torque to zero (6084h), so
+// Makes the motion of the impedance type: joint torques computed from the tool's position (torque_rendering.hpp).
+// Before rendering, torques hold the joints in place. A drive that stops ramps its torque to zero by itself (6084h), so
 // this class has neither run-out nor hold.
 //
-// During the tare, the holding torque beyond the model's weight, low-passed with 50 ms, is weight missing from the
-// model. More than 2 % of a joint's max_torque_Nm is a fault before anything moves. Less becomes τ_0 and is compensated
-// from the start on. So an empty device stands still where it starts. Elsewhere the model's error is different, and the
-// difference, less friction, moves the device.
+// During the tare, the holding torque less the model's weight, low-passed with 50 ms, is the torque of weight that the
+// model lacks. If this torque exceeds 2 % of a joint's max_torque_Nm, a fault is raised before anything moves. A
+// smaller torque becomes τ_0, which is compensated from the start on, so an empty device stands still in its start
+// pose. In other poses the model's error is different, and the difference, less friction, moves the device.
 //
-// When nobody holds the handle (handle/empty_handle.hpp), the device is braked at 4 m/s² and its joints are then held
-// in place while it goes on rendering, with `let_go: hold` as with `rest`. The sensor's bias can't move such a device,
-// so no force counts as a bias. But a tool whose mass differs from the model's reads as a force after it has turned,
-// and lifts or drags the device: by τ_0 as a force at the tool, if it has turned by 60 degrees and only the tool is
-// wrong. The handle counts as empty below that force, too.
+// When nobody holds the handle (handle/empty_handle.hpp), the device is braked at 4 m/s². Then its joints are held in
+// place while rendering continues. `let_go: hold` acts like `let_go: rest`. The sensor's bias can't move a device of
+// the impedance type, so no force counts as a bias. But if the tool's mass differs from the model's, the sensor reads a
+// force after the tool has turned, and the missing weight lifts or drags the device. If the tool has turned by 60
+// degrees and only the tool's mass is wrong, this force equals τ_0, expressed as a force at the tool. So the handle
+// also counts as empty below that force.
 #pragma once
 
 #include <memory>
@@ -27,7 +28,7 @@ namespace proxarm::controller {
 
 class TorqueMotion final : public Motion {
  public:
-  // tool_mass_kg: of everything behind the sensor. Precondition: the arm outlives this object.
+  // tool_mass_kg: mass of everything behind the sensor. Precondition: the arm outlives this object.
   TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const models::Arm& arm,
                const std::vector<description::DriveDescription>& drives,
                const description::SupervisionDescription& supervision, double tool_mass_kg, double period_s);
@@ -62,11 +63,12 @@ class TorqueMotion final : public Motion {
  private:
   struct State {
     models::JointVector torque_Nm;
-    models::JointVector missing_Nm;  // τ_0, as measured by the hold so far
+    models::JointVector missing_Nm;  // τ_0, as measured so far while the joints are held
     models::Vec3 proxy_W = models::Vec3::Zero();
-    models::Vec3 tool_k1_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();  // v: low-passed
-    double missing_N = 0.0;                                                     // τ_0 as a force at the tool
-    double braked_m_per_s = 0.0;  // speed bound of the tool while nobody holds it
+    // The tool's place in the last cycle; the tool's velocity, low-passed.
+    models::Vec3 tool_k1_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();
+    double missing_N = 0.0;       // τ_0 as a force at the tool
+    double braked_m_per_s = 0.0;  // speed bound of the tool while nobody holds the handle
     bool braked = false;
   };
 

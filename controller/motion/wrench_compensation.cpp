@@ -86,8 +86,8 @@ void WrenchCompensation::learn_at(const Mat3& R_WS, double share) noexcept {
   learnt_gravity_S_ -= share * turned_gravity_S(R_WS);
 }
 
-// Variance, (Σ(x − x₁)² − n (x̄ − x₁)²)/(n − 1). Sums are about the first sample x₁, so that a large bias costs no
-// digits.
+// Returns the variance of the samples, (Σ(x − x₁)² − n (x̄ − x₁)²)/(n − 1). The first sample x₁ is subtracted in all
+// sums, so that a large bias costs no digits.
 Vec3 WrenchCompensation::tare_variance_S() const noexcept {
   const double n = tare_samples();
   const Vec3 mean = tare_sum_S_.force / n - tare_first_S_;
@@ -104,9 +104,11 @@ double WrenchCompensation::step_noise_N() const noexcept {
   return std::sqrt(tare_steps_S_.maxCoeff() / (2.0 * (tare_samples() - 1.0)));
 }
 
-// Von Neumann's ratio (J. von Neumann, Distribution of the ratio of the mean square successive difference to the
-// variance, 1941), here Σ(xᵢ₊₁ − xᵢ)² over twice Σ(xᵢ − x̄)². It is 1 to within 1/√n for white noise; (ωT)²/2 for a
-// motion at ω, 2 % at 30 Hz and 1 ms; and 1 − e^(−T/τ) behind a first-order filter, 0.5 at 110 Hz and 1 ms.
+// Compares Von Neumann's ratio, here Σ(xᵢ₊₁ − xᵢ)² divided by 2 Σ(xᵢ − x̄)², with 0.5 (J. von Neumann, Distribution of
+// the ratio of the mean square successive difference to the variance, 1941). Values of this ratio:
+//   1 to within 1/√n   white noise
+//   (ωT)²/2            a motion at ω; 2 % at 30 Hz and 1 ms
+//   1 − e^(−T/τ)       noise behind a first-order filter; 0.5 at 110 Hz and 1 ms
 bool WrenchCompensation::noise_is_white() const noexcept {
   if (tare_count_ < 2) return true;
   int noisiest = 0;

@@ -18,7 +18,7 @@ bool AdmittanceProxy<N>::start(const ProxyStart<N>& start) noexcept {
   if (!start.q.allFinite() || !start.v.allFinite() || !start.a.allFinite() || !std::isfinite(start.time_s)) {
     return false;
   }
-  // q(t₀ − T) by q(t) = q₀ + v₀t + ½a₀t². The sample before the first step is the state at t₀.
+  // q_k1 is the state at t₀. q_k2 is the state at t₀ − T, by q(t) = q₀ + v₀t + ½a₀t².
   const double T = config_.period_s;
   past_ = {};
   past_.q_k1 = start.q;
@@ -69,7 +69,8 @@ template <int N>
 void AdmittanceProxy<N>::prepare() noexcept {
   const double M = config_.mass_kg, B = config_.damping_Ns_per_m, K_v = config_.spring_N_per_m;
   const double T = config_.period_s, T_o = past_.period_k1_s;
-  // (26a) with B and K_v, for two intervals that may differ. κq₁ = [2M/(T(T + T_o)) + B/T + K_v] q₁ is factored out.
+  // The coefficients are those of (26a) with B and K_v, for two intervals that may be unequal.
+  // κq₁ = [2M/(T(T + T_o)) + B/T + K_v] q₁ is factored out.
   verlet_ = {};
   verlet_.plain = T == T_o && B == 0.0 && K_v == 0.0;
   const double inertia = verlet_.plain ? M / (T * T) : 2.0 * M / (T * (T + T_o));

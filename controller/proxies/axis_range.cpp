@@ -13,8 +13,8 @@ namespace {
 using models::Vec3;
 
 struct Turned {
-  Vec3 tilt;     // rotation vector, across the axis
-  double twist;  // rad, about it
+  Vec3 tilt;     // rotation vector, at right angles to the axis
+  double twist;  // rad, about the axis
 };
 
 Eigen::Quaterniond about(const Vec3& axis, double angle) noexcept { return models::rotation_by(angle * axis); }
@@ -25,8 +25,8 @@ Turned parts_of(const Eigen::Quaterniond& turn, const Vec3& axis) noexcept {
   return {models::rotation_vector(turn * about(axis, -twist)), twist};
 }
 
-// A step along both borders may be longer than allowed. Each shortening reduces the excess to about a thousandth, since
-// a step has at most 0.1 rad.
+// Number of times that a step is shortened, since a step along both borders may be longer than allowed. Each shortening
+// reduces the excess to about a thousandth, since a step is at most 0.1 rad long.
 constexpr int kShorter = 3;
 
 bool is_range(double most) noexcept { return (most >= 0.0 && most <= 3.0) || most == AxisRange::everything; }
@@ -56,7 +56,8 @@ bool AxisRange::keep(const Eigen::Quaterniond& start, const Eigen::Quaterniond& 
   if (!tilted && !twisted) return false;
   if (tilted) now.tilt *= most_tilt / tilt;
   if (twisted) now.twist = std::clamp(now.twist, -most_twist, most_twist);
-  // Tilt and twist are curved: the step to a border may be longer than the requested one and would push the hand.
+  // The coordinates tilt and twist are curved, so the step to a border may be longer than the requested step. A longer
+  // step would push the hand.
   const double asked = models::rotation_vector(to * from.conjugate()).norm();
   const double most_rad = std::min(step.most_rad, std::max(asked, TurnSets::returning_rad_per_s * step.period_s));
   double share = 1.0;

@@ -43,9 +43,10 @@ void ForceWeights<N>::start(const ProxyStart<N>& start, const ProxySolver<N>& so
   media_ = has_media_ ? solve.g().media_at(start.q) : 0;
 }
 
-// h gets Störmer's correction once h(k−2) is known. A free start needs another term: start() sets q(k−2) without −T³ȧ/6
-// of its Taylor series, because ȧ is unknown. So the first step ends T²δ/(6M) short, δ = h(k+1) − h(k). The second step
-// makes up for it, and the third mustn't take this for a velocity.
+// Computes a step, with Störmer's correction of h if h(k−2) is known. After a start in free motion, other corrections
+// are needed: start() sets q(k−2) without the term −T³ȧ/6 of its Taylor series, because ȧ is unknown. So the first step
+// ends T²δ/(6M) short, δ = h(k+1) − h(k). The correction of the second step adds this distance. The correction of the
+// third step removes the velocity that this distance would otherwise add.
 template <int N>
 ProxyFault ForceWeights<N>::step(const ProxyRule& of_26, const ProxyHistory<N>& past, const V& h_k, const V& q_ref,
                                  const ProxySolver<N>& solve, ProxyTrial<N>& out) noexcept {
@@ -89,7 +90,8 @@ ProxyFault ForceWeights<N>::take_step(const Given& given, ProxyTrial<N>& out) no
   return event && fault == ProxyFault::none ? first_order(given, out) : fault;
 }
 
-// While a proxy rests or the world's force is constant, the weights change nothing, and (26) suffices.
+// Computes a step of (26) while the proxy rests or the world's force is constant, since weights then change nothing.
+// Returns whether the step may be taken.
 template <int N>
 auto ForceWeights<N>::steady_step(const Given& given, ProxyTrial<N>& out, ProxyFault& fault) noexcept -> Steady {
   fault = step_of_26(given.of_26, given.past, given.h, given.q_ref, period_s_, given.solve, out);
@@ -101,7 +103,8 @@ auto ForceWeights<N>::steady_step(const Given& given, ProxyTrial<N>& out, ProxyF
   return steady_ ? Steady::yes : Steady::no;
 }
 
-// The header's equations. `event`: the step contains an event and must not be taken.
+// Computes a step with weighted forces, by the equations of the header. `event`: the step contains an event and must
+// not be taken.
 template <int N>
 ProxyFault ForceWeights<N>::weighted(const Given& given, ProxyTrial<N>& out, bool& event) noexcept {
   const ProxyHistory<N>& past = given.past;
@@ -127,11 +130,11 @@ ProxyFault ForceWeights<N>::weighted(const Given& given, ProxyTrial<N>& out, boo
     if (crosses(given, out)) return cut(given, out, event);
   }
   if (!event && (contacts_.slips || contacts_.acts || media_ != 0)) {
-    // Square of an angle: 40 times the rounding of the difference below, relative to `both`.
+    // Square of the smallest angle that counts as a turn: 40 times the rounding error of (both − along²)/both.
     constexpr double least_angle2 = 1e-14;
     const V way = out.q - q_k1, before = q_k1 - past.q_k2;
     const double along = way.dot(before), both = way.squaredNorm() * before.squaredNorm();
-    // Friction and media never push a proxy on: former forces mustn't turn back a proxy that has come to rest.
+    // Friction and media never push a proxy on, so weighted forces of former steps mustn't reverse a proxy's motion.
     event = along < 0.0;
     const bool turns = given.solve.timed() || media_ != 0 || both - along * along > least_angle2 * both;
     if (!event && turns && mode_ != Mode::medium && !contacts_.held) {
@@ -167,7 +170,7 @@ void ForceWeights<N>::take_weighted(const Given& given, const V& p_hat_of_26, Pr
   const ProxyHistory<N>& past = given.past;
   if (!contacts_.known) contacts_ = contacts_of(given, out, past.q_k1);
   if (mode_ == Mode::starting) {
-    // F is known here and a period before; a line through both gives the value before that.
+    // F is known now and one period ago. A straight line through both values gives F two periods ago.
     F_[1] = F_[0] - given.h_k;
     F_[2] = 2.0 * F_[1] - out.f;
     mode_ = Mode::surface;
@@ -178,7 +181,7 @@ void ForceWeights<N>::take_weighted(const Given& given, const V& p_hat_of_26, Pr
   F_[0] = out.f;
   cut_ = false;
   if (undamped_) {
-    // F₂ becomes zero only at the end of damping, since the end of a contact is an event.
+    // The end of a contact is an event, so this branch is reached only at the end of damping by the world.
     if (contacts_.count == 0 && out.q == out.p_hat && F_[1] == V::Zero() && F_[2] == V::Zero()) mode_ = Mode::free;
     steady_ = !has_media_ && as_much(F_[0], F_[1]) && as_much(F_[0], F_[2]);
     report(given, p_hat_of_26, out);
@@ -189,7 +192,7 @@ void ForceWeights<N>::take_weighted(const Given& given, const V& p_hat_of_26, Pr
   report(given, p_hat_of_26, out);
 }
 
-// The force on the whole proxy is M∇²q/T². Reports the world's part of it as in (25a).
+// Sets p̂, κ and f of `out` so that f, the world's part of the proxy's force M∇²q/T², follows from p̂ and κ by (25a).
 template <int N>
 void ForceWeights<N>::report(const Given& given, const V& p_hat_of_26, ProxyTrial<N>& out) const noexcept {
   const ProxyHistory<N>& past = given.past;
@@ -207,8 +210,9 @@ void ForceWeights<N>::report(const Given& given, const V& p_hat_of_26, ProxyTria
   }
 }
 
-// The step from q̃; `out` and `now` hold the one from q₁. Both must have the same contacts, each from the same side,
-// since q̃ may be beyond a two-sided wall. `unresolved`: 𝒢's count of unresolved steps before.
+// Computes the step from q̃. On entry `out` and `now` contain the step from q₁. An event is found if the two steps
+// don't have the same contacts, each from the same side: q̃ may be beyond a two-sided wall. `unresolved`: 𝒢's count of
+// unresolved steps before this step.
 template <int N>
 ProxyFault ForceWeights<N>::from_ahead(const Given& given, std::uint64_t unresolved, ProxyTrial<N>& out,
                                        ContactSet& now, bool& event) noexcept {
@@ -228,15 +232,16 @@ ProxyFault ForceWeights<N>::from_ahead(const Given& given, std::uint64_t unresol
           !same_sides(contacts_from_q1, normals, g.contacts());
   if (event) return ProxyFault::none;
 
-  // Behind a mesh, another object may hold the proxy in the same way, and q̃ would lead on behind the mesh. So if the
-  // result differs from that from q₁ by more than a thousandth of the way, it must be reachable from q₁.
+  // q̃ may be behind a mesh, where another object has the same contacts, and the proxy would then go on behind the
+  // mesh. So if the step from q̃ ends elsewhere than the step from q₁, by more than a thousandth of the motion, its end
+  // must be reachable from q₁.
   if (!((out.q - from_q1).norm() > 1e-3 * (from_q1 - q_k1).norm())) return ProxyFault::none;
   event = !in_reach(given, out);
   if (event) return ProxyFault::none;
-  return given.solve(out, q_tilde, law_period_s);  // repeated so that 𝒢's contacts are this step's
+  return given.solve(out, q_tilde, law_period_s);  // repeated so that 𝒢 reports the contacts of this step
 }
 
-// Whether the proxy can get from q₁ to out.q. κ is so large that media don't matter, only obstacles.
+// Whether the proxy can get from q₁ to out.q. κ is so large that only obstacles matter, not media.
 template <int N>
 bool ForceWeights<N>::in_reach(const Given& given, const ProxyTrial<N>& out) noexcept {
   ProxyTrial<N> way{.kappa = 1e15 * out.kappa, .p_hat = out.q, .q = out.q, .f = out.f};
@@ -244,7 +249,7 @@ bool ForceWeights<N>::in_reach(const Given& given, const ProxyTrial<N>& out) noe
          (way.q - out.q).norm() <= 1e-9 * (1.0 + out.q.template lpNorm<1>());
 }
 
-// A step by (26): in free motion, at an event or soon after one.
+// Computes a step by (26), for free motion, an event or the steps soon after an event.
 template <int N>
 ProxyFault ForceWeights<N>::first_order(const Given& given, ProxyTrial<N>& out) noexcept {
   const ProxyFault fault = step_of_26(given.of_26, given.past, given.h, given.q_ref, period_s_, given.solve, out);
@@ -292,7 +297,8 @@ void ForceWeights<N>::take_first_order(const Given& given, ProxyTrial<N>& out) n
   ++first_order_steps_;
 }
 
-// The header's θ. Changes of h at an angle to the slide are neglected.
+// If friction has released the proxy, computes onset_ from θ of the header. Changes of h at right angles to the slide
+// are neglected.
 template <int N>
 void ForceWeights<N>::look_for_onset(const Given& given, const ProxyTrial<N>& out) noexcept {
   const V& q_k1 = given.past.q_k1;
@@ -300,28 +306,29 @@ void ForceWeights<N>::look_for_onset(const Given& given, const ProxyTrial<N>& ou
   const double a = left_over.norm();
   if (q_k1 != given.past.q_k2 || forces_known_ == 0 || !(a > 0.0)) return;
   const double growth = (given.h_k - h_k1_).dot(left_over) / a;
-  constexpr double rounding = 1e-6;               // share of a, for a release right after a sample
-  if (!(a <= (1.0 + rounding) * growth)) return;  // h jumped, or the world caused the release
+  constexpr double rounding = 1e-6;               // tolerance of θ ≤ 1, for a release right after a sample
+  if (!(a <= (1.0 + rounding) * growth)) return;  // h has jumped, or the world caused the release
   const double share = a / growth;
   onset_ = (0.5 * growth * (share * (share - 1.0) + 1.0 / 3.0) / a) * left_over;
   lets_go_ = true;
 }
 
-// Whether the step in `out`, which leads into other media, can be cut at their border. With contacts, this is an
-// ordinary event.
+// Whether the step in `out`, which leads into other media, can be cut at the media's border. A step with contacts
+// can't be cut: it is an event like any other.
 template <int N>
 bool ForceWeights<N>::crosses(const Given& given, const ProxyTrial<N>& out) const noexcept {
   return undamped_ && given.past.period_k1_s == period_s_ && (mode_ == Mode::free || mode_ == Mode::medium) &&
          restart_steps_left_ == 0 && given.solve.g().contacts().empty() && out.q != given.past.q_k1;
 }
 
-// The step in `out` crosses the border of a medium. With the velocity v₁ at t_k, constant acceleration moves the proxy
-// along q₁ + θT v₁ + θ²(q − q₁ − T v₁). The border is searched on the straight line, which is free of objects. Beyond
-// it, the proxy follows another parabola in the other media. `event`: that way is blocked or crosses another border.
+// Cuts the step in `out` at the border of a medium. With the velocity v₁ at t_k, constant acceleration moves the proxy
+// along q₁ + θT v₁ + θ²(q − q₁ − T v₁). The border is searched on the straight line from q₁ to q, which is free of
+// objects. Beyond the border, the proxy follows another parabola in the other media. `event`: this parabola meets an
+// object or another border.
 template <int N>
 ProxyFault ForceWeights<N>::cut(const Given& given, ProxyTrial<N>& out, bool& event) noexcept {
   constexpr int halvings = 40;
-  constexpr double least_share = 1e-6;  // of T: shortest rest after the border that gets a step
+  constexpr double least_share = 1e-6;  // smallest part of T after the border for which a parabola is computed
   const double T = period_s_, M = mass_kg_;
   const ProxyHistory<N>& past = given.past;
   models::GeometricAlgorithm<N>& g = given.solve.g();
@@ -361,10 +368,11 @@ ProxyFault ForceWeights<N>::cut(const Given& given, ProxyTrial<N>& out, bool& ev
   return ProxyFault::none;
 }
 
-// One step of constant acceleration, with the force of a velocity law in its middle:
+// Computes one step of constant acceleration, with the force of a velocity law in the middle of the step:
 //   q = q₁ + T v₁ + T²(h + F)/(2M)   gives   κ = 2M/T² + B/T + K_v,   p̂ = q₁ + [2Mv₁/T + K_v(q_ref − q₁) + h]/κ
-// With B or K_v it is the first step of a motion. At a medium's border v = v₁ + T(h + F)/M. After the second step F and
-// its slope are known, and the history becomes the one of a motion without a border:
+// If B or K_v isn't zero, this is the first step of a motion. Otherwise this step follows a medium's border; the
+// velocity becomes v = v₁ + T(h + F)/M. After the second step F and its slope are known, and the history is set as if
+// the motion had crossed no border:
 //   q(k−2) = q − Tv + ½T²a − T³ȧ/6,   Ma = h + F at t_{k+1}
 template <int N>
 ProxyFault ForceWeights<N>::parabola(const Given& given, ProxyTrial<N>& out, bool& event) noexcept {
@@ -397,7 +405,7 @@ ProxyFault ForceWeights<N>::parabola(const Given& given, ProxyTrial<N>& out, boo
   if (parabolas_left_ > 0) {
     came_from_ += (0.5 * T * T / M) * (given.h_k + out.f);
   } else {
-    const V slope = F_[0] - F_[1], h_slope = given.h_k - h_k1_;  // per period
+    const V slope = F_[0] - F_[1], h_slope = given.h_k - h_k1_;  // change per period
     F_[2] = F_[1] - slope;
     const V force = given.h_k + h_slope + F_[0] + 0.5 * slope;
     came_from_ += (T * T / M) * (0.5 * force - (slope + h_slope) / 6.0);
@@ -423,8 +431,9 @@ auto ForceWeights<N>::contacts_of(const Given& given, const ProxyTrial<N>& out, 
   return set;
 }
 
-// Whether the normals of the contacts in `set` are within 90° of `normals`. A curved surface that turns by more in a
-// third of a step is an event, too.
+// Whether all `contacts` press from the side from which the contacts of `set`, with the normals `normals`, press. Two
+// contacts of one object and feature press from one side if their normals are less than 90° apart. A curved surface
+// whose normal turns by more than that in a third of a step is an event, too.
 template <int N>
 bool ForceWeights<N>::same_sides(const ContactSet& set, const std::array<V, max_contacts>& normals,
                                  std::span<const models::Contact<N>> contacts) noexcept {

@@ -1,11 +1,14 @@
-// Impedance-type rendering with the same 𝒢: measured tool position in, force for the actuators out.
+// Computes the force for the actuators from the measured tool position: impedance-type rendering with a 𝒢.
 //
-// Four laws of Kikuuwe and Fujimoto (World Haptics 2007), whose experiment (Fig. 5) compares three of them:
-//   plain          q = 𝒢(K, p, q₁),  f = K(q − p)                                        (1)
-//   damped_motion  q = 𝒢(K, p, q₁),  f = K(q − p) + B(∇q − ∇p)/T                         (5)   can suck at release
-//   damped_tool    q = 𝒢(K, p, q₁),  f = K(q − p) − B∇p/T                                (6)   drags in free space
-//   implicit       p̂ = p + B(q₁ − p₁)/(KT + B),  q = 𝒢(K + B/T, p̂, q₁),  f = (K + B/T)(q − p̂)   (23)   neither
-// with q₁ = q(k−1), p₁ = p(k−1), ∇x = x(k) − x(k−1). p: tool; f: force on the hand. One frame, metres, newtons.
+// The four laws are those of Kikuuwe and Fujimoto (World Haptics 2007). The paper's experiment (Fig. 5) compares three
+// of them:
+//   plain          q = 𝒢(K, p, q₁),  f = K(q − p)                                                (1)
+//   damped_motion  q = 𝒢(K, p, q₁),  f = K(q − p) + B(∇q − ∇p)/T                                 (5)
+//   damped_tool    q = 𝒢(K, p, q₁),  f = K(q − p) − B∇p/T                                        (6)
+//   implicit       p̂ = p + B(q₁ − p₁)/(KT + B),  q = 𝒢(K + B/T, p̂, q₁),  f = (K + B/T)(q − p̂)     (23)
+// q₁ = q(k−1), p₁ = p(k−1), ∇x = x(k) − x(k−1). p: position of the tool. f: force on the hand. All vectors are in one
+// frame. Units: metres, newtons. damped_motion can pull the tool back to an object that it leaves. damped_tool drags
+// the tool in free space. implicit does neither.
 //
 // One caller at a time. step() may be called in the cycle: it doesn't allocate, lock, throw or print.
 #pragma once
@@ -36,7 +39,7 @@ class ImpedanceProxy {
  public:
   using V = models::Vec<N>;
 
-  // Validates `config`. Precondition: only this proxy uses `g`, which outlives it.
+  // Validates `config`. Precondition: `g` outlives this proxy, and only this proxy uses `g`.
   ImpedanceProxy(const ImpedanceConfig& config, models::GeometricAlgorithm<N>& g) : config_(config), g_(&g) {
     config_.validate();
   }
@@ -51,7 +54,7 @@ class ImpedanceProxy {
     return true;
   }
 
-  // One period with the tool measured at p(k). A fault leaves everything unchanged.
+  // Computes one period with the tool measured at p(k). A fault leaves everything unchanged.
   [[nodiscard]] ProxyFault step(const V& p) noexcept {
     if (!p.allFinite()) return ProxyFault::input_not_finite;
     const double K = config_.stiffness_N_per_m, B = config_.damping_Ns_per_m, T = config_.period_s;
@@ -85,7 +88,7 @@ class ImpedanceProxy {
 
   void archive(fieldbus::StateArchive& state) noexcept {
     state(q_k1_, p_k1_, p_hat_, f_, epoch_s_, steps_);
-    // As in AdmittanceProxy::archive().
+    // A moving object must start the next step, to the bit, at the place where the last step ended.
     if (steps_ > 0) g_->set_time({epoch_s_ + static_cast<double>(steps_ - 1) * config_.period_s, config_.period_s});
   }
 

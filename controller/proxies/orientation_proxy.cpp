@@ -11,7 +11,7 @@ namespace {
 using models::Mat3;
 using models::Vec3;
 
-// exp([φ]ₓ) as a unit quaternion. Below 1e-8 rad, sin(φ/2)/φ is ½ to the last bit of a double.
+// Returns exp([φ]ₓ) as a unit quaternion. Below 1e-8 rad, sin(φ/2)/φ is ½ to the last bit of a double.
 Eigen::Quaterniond rotation(const Vec3& phi) noexcept {
   const double angle = phi.norm();
   const double scale = angle < 1e-8 ? 0.5 : std::sin(0.5 * angle) / angle;
@@ -20,7 +20,7 @@ Eigen::Quaterniond rotation(const Vec3& phi) noexcept {
   return q;
 }
 
-// The φ of smallest norm (0..π) with exp([φ]ₓ) = q.
+// Returns the φ of smallest norm (0 to π) with exp([φ]ₓ) = q.
 Vec3 rotation_vector(const Eigen::Quaterniond& q) noexcept {
   const Vec3 axis = q.w() < 0.0 ? Vec3(-q.vec()) : Vec3(q.vec());
   const double sine = axis.norm();
@@ -42,7 +42,7 @@ void OrientationConfig::validate() const {
                  "Nm s/rad, 0 or more");
   require_option(is_positive(turn.max_speed_rad_per_s), "orientation.max_speed", turn.max_speed_rad_per_s,
                  "rad/s, above 0");
-  // Less than π by more than a step, so that no step can jump across to the limit's other side.
+  // The limit is less than π by more than a step, so that no step jumps past π to the limit's other side.
   require_option(is_not_negative(turn.max_turn_rad) && turn.max_turn_rad <= 3.0, "orientation.max_angle",
                  turn.max_turn_rad, "rad, from 0 to 3");
   turn.axis_range.validate();
@@ -89,7 +89,9 @@ double OrientationProxy::kinetic_J() const noexcept {
   return 0.5 * (config_.inertia_kg_m2 * omega_T.squaredNorm() - omega_T.dot(config_.behind_sensor_T * omega_T));
 }
 
-// K'φ' = Kφ keeps the torque when K becomes K'. A softer spring makes no jump that could hurt, so its reference stays.
+// When the spring's stiffness K becomes K', the reference moves so that the rotation vector φ from the reference
+// becomes φ' with K'φ' = Kφ, which keeps the torque. If the spring becomes softer, the torque's jump can't hurt, so the
+// reference stays.
 void OrientationProxy::set_spring(double spring_Nm_per_rad) noexcept {
   if (!is_not_negative(spring_Nm_per_rad)) return;
   const double before = config_.spring_Nm_per_rad;

@@ -15,8 +15,9 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-// Largest turn per step. A larger one would wrap around and pull back (a full turn wouldn't pull at all); 10 Nm on 3e-5
-// kg m² at 250 Hz make one. Larger turns pull as if they were this size.
+// Largest angle by which p̂ is turned from q in a step; larger angles are reduced to this. The torque towards p̂ would
+// pull back if the angle exceeded half a turn, and would be zero at a full turn. 10 Nm on 3e-5 kg m² at 250 Hz would
+// turn p̂ by nearly a full turn.
 constexpr double kMostTurn_rad = 1.0;
 
 Mat3 cross_matrix(const Vec3& v) noexcept {
@@ -31,7 +32,7 @@ bool in_range(const PoseConfig& c) noexcept {
          is_not_negative(c.turning_spring_Nm_per_rad) && is_positive(c.period_s);
 }
 
-// M₆ in the axes of c and I.
+// Returns M₆ along the axes of centre_m and inertia_kg_m2.
 Mat6 mass_matrix(const PoseConfig& config, const Vec3& centre_m, const Mat3& inertia_kg_m2) noexcept {
   Mat6 M = Mat6::Zero();
   M.topLeftCorner<3, 3>() = config.mass_kg * Mat3::Identity();
@@ -41,7 +42,7 @@ Mat6 mass_matrix(const PoseConfig& config, const Vec3& centre_m, const Mat3& ine
   return M;
 }
 
-// Factorises only at set-up and after a change.
+// This function factorises A, so call it only at set-up and after a change.
 bool is_positive_definite(const Mat6& A) noexcept {
   const Eigen::LLT<Mat6> factor(A);
   return factor.info() == Eigen::Success;
@@ -78,7 +79,7 @@ void PoseProxy::start(const ToolPose& q, double time_s) noexcept {
   make_K();
 }
 
-// Moving objects must start, to the bit, at the place where the last step left them.
+// Sets the time of 𝒢. Moving objects must start, to the bit, at the place where the last step left them.
 void PoseProxy::tell_time() noexcept {
   if (g_->wants_time()) g_->set_time({time_s_, config_.period_s});
 }

@@ -15,16 +15,17 @@ using models::Vec3;
 
 namespace {
 
-// Shares of the speed limits for the proxy. A hand that suddenly pushes 50 N on the 0.5 kg of a light device is faster
-// than the proxy by some tenths of m/s for 20 ms, until K and B have responded.
+// Shares of the speed limits that the proxy may use. A hand that suddenly pushes 50 N on the 0.5 kg of a light device
+// moves it faster than the proxy by some tenths of m/s for 20 ms, until K and B have responded.
 constexpr double joint_speed_share = 0.75, tool_speed_share = 0.4;
-// Share of a joint's acceleration for braking the proxy. A hand's mass of 1 kg triples the inertia at the elbow of a
-// light device, and the hand may keep pushing with most of the drive's torque.
+// Share of a joint's maximum acceleration with which the proxy brakes. A hand's mass of 1 kg triples the inertia at the
+// elbow of a light device, and the hand may keep pushing with most of the drive's torque.
 constexpr double braking_share = 0.2;
-// Tangent planes approximate the ball |J u| ≤ vT, each at the solution with those before. Each cut squares the angle
-// that is left: after six, only rounding remains, which scaling removes.
+// Number of tangent planes that approximate the ball |J u| ≤ vT. Each plane touches the ball in the direction of the
+// solution with the planes before it, and squares the remaining angle between solution and ball. After six planes only
+// rounding remains, which scaling removes.
 constexpr int most_cuts = 6;
-// Share of a bound: smaller differences are the program's rounding.
+// Tolerance as a share of a bound. Smaller differences are the program's rounding.
 constexpr double rounding = 1e-9;
 
 }  // namespace
@@ -62,7 +63,7 @@ const JointVector& JointCoupling::step(const JointVector& link_rad, const Jacobi
   given.torque_Nm.setZero();
   given.released_N = 0.0;
   if (link_rad.allFinite()) {
-    const double K = stiffness_share / (t_s_ * t_s_), B = damping_share / t_s_, T = period_s_;  // per M
+    const double K = stiffness_share / (t_s_ * t_s_), B = damping_share / t_s_, T = period_s_;  // divided by M
     const JointMatrix M = arm_->mass_matrix(link_rad);
     const JointVector u_hat = link_rad + B / (K * T + B) * (c_k1_ - phi_k1_) - c_k1_;  // (23a)
     const Box free = box(M);
@@ -80,7 +81,7 @@ const JointVector& JointCoupling::step(const JointVector& link_rad, const Jacobi
   return torque_Nm_;
 }
 
-// Means over the last steps_.
+// Computes the means over the last steps_ steps.
 void JointCoupling::take_mean() noexcept {
   torque_Nm_.setZero();
   released_N_ = 0.0;
@@ -106,7 +107,8 @@ JointCoupling::Box JointCoupling::box(const JointMatrix& M) const noexcept {
   return box;
 }
 
-// The release's row has a multiplier of at most `price`; at that price the row leaves the program and is fully paid.
+// The multiplier of the release's row may be at most `price`. If the multiplier would be larger, the program is solved
+// again without this row, and with the force `price` in the row's direction.
 JointVector JointCoupling::nearest(const JointVector& u_hat, const JointMatrix& M, const Jacobian& J_W, const Box& box,
                                    const Bounds& bounds, double price, double& paid) noexcept {
   const JointVector still = JointVector::Zero(u_hat.size());

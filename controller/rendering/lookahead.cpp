@@ -9,7 +9,8 @@ using models::Vec3;
 
 namespace {
 
-// H/T is a quotient of decimal numbers; a value just below a whole number by rounding counts as that number.
+// H/T is a quotient of decimal numbers. A quotient that rounding makes slightly smaller than a whole number counts as
+// this number.
 constexpr double rounding_steps = 1e-9;
 
 }  // namespace
@@ -47,7 +48,8 @@ auto Lookahead<N>::operator()(const AdmittanceProxy<N>& proxy, const SceneChange
   return rest > 0.0 ? V(before + rest * (proxy_.q() - before)) : proxy_.q();
 }
 
-// Collects the limits within reach. The bound of a border's plane falls by plane.share of the way towards it.
+// Collects the limits that the prediction can reach. The bound of a border's plane falls by plane.share of the motion
+// towards the plane.
 template <int N>
 void Lookahead<N>::gather_limits(const StepLimits& limits, double reach_m) noexcept {
   ahead_.soft_count = ahead_.hard_count = ahead_.plane_count = 0;

@@ -14,15 +14,16 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-// Return speed of the spring's reference to the tool's start, after the spring became stiffer and after a hold: slow
-// enough for a hand to follow.
+// Speed at which the spring's reference returns to the tool's start pose, after the spring has become stiffer and after
+// a hold. It is slow enough for a hand to follow.
 constexpr double reference_m_per_s = 0.05, reference_rad_per_s = TurnSets::returning_rad_per_s;
-// A tool that starts in contact is outside to rounding: of some metres in double precision.
+// Rounding error of positions of some metres. A tool that touches an object at its start may be inside the object by
+// this distance.
 constexpr double rounding_m = 1e-12;
-// After a hold in contact, the twisted gears put the tool some micrometres inside the object. Up to this much is
-// corrected.
+// After a hold in contact, the twisted gears put the tool some micrometres inside the object. The start pose is
+// corrected if the correction is at most this large.
 constexpr double settled_m = 1e-3, settled_rad = 0.01;
-// Tolerance of the rotation limits; a wall holds to 1e-7 rad against 10 Nm.
+// Tolerance of the sets of turning. A wall yields by 1e-7 rad to 10 Nm.
 constexpr double yields_rad = 1e-6;
 constexpr int most_walls = 3;
 
@@ -60,8 +61,8 @@ void PoseWorld::start(const Vec3& q_W) noexcept {
   last_.q_W = last_.p_hat_W = q.position;
 }
 
-// The pose outside all objects next to the wanted one, if there is one: on the way from the last pose, which was
-// outside.
+// Returns the pose nearest to `wanted` that 𝒢 reaches from the last pose, which is outside all objects. Returns
+// `wanted` if `wanted` is outside all objects, or if the reached pose is too far from `wanted`.
 ToolPose PoseWorld::outside(const ToolPose& wanted) noexcept {
   if (g_->clearance_m(wanted) >= -rounding_m) return wanted;
   const ToolPose reached = g_->step(proxy_.K(), wanted, proxy_.q());
@@ -69,7 +70,7 @@ ToolPose PoseWorld::outside(const ToolPose& wanted) noexcept {
   return off.head<3>().norm() <= settled_m && off.tail<3>().norm() <= settled_rad ? reached : wanted;
 }
 
-// One step of 𝒢 from the last pose goes as far towards the wanted pose as the scene allows, and through no object.
+// One step of 𝒢 from the last pose moves the tool to the pose nearest to the wanted pose, and through no object.
 Vec3 PoseWorld::resume(const Vec3& q_W, const Vec3& v_W) noexcept {
   const ToolPose wanted{q_W, R_WT_};
   if (!q_W.allFinite() || !v_W.allFinite() || !R_WT_.coeffs().allFinite() || !omega_W_.allFinite()) return last_.q_W;
@@ -152,7 +153,7 @@ void PoseWorld::return_reference() noexcept {
   proxy_.set_reference(step == way ? home_ : models::moved(proxy_.reference(), step));
 }
 
-// The limits' force on the proxy is the one that holds p̂ back.
+// Sets last_. The limits' wrench on the proxy is the wrench that holds p̂ back, plus the walls' wrench.
 void PoseWorld::report(const ToolPose& p_hat, const ToolPose& limited) noexcept {
   last_ = {};
   last_.q_W = proxy_.q().position;
@@ -171,7 +172,7 @@ void PoseWorld::report(const ToolPose& p_hat, const ToolPose& limited) noexcept 
   report_contacts();
 }
 
-// Keeps the strongest contacts, strongest first. Contacts without force don't count.
+// Reports the contacts with the largest forces, in falling order. Contacts without force don't count.
 void PoseWorld::report_contacts() noexcept {
   auto end = touches_.begin();
   for (const models::PoseContact& contact : g_->contacts()) {
@@ -231,7 +232,8 @@ void PoseWorld::hang(double proxy_mass_kg, const models::ToolInertia& behind) no
   proxy_.set(changed);
 }
 
-// K'e' = Ke keeps the force when K becomes K'. A softer spring makes no jump that could hurt, so its reference stays.
+// When a spring's stiffness K becomes K', its reference moves so that the distance e from the reference becomes e' with
+// K'e' = Ke, which keeps the force. If the spring becomes softer, the force's jump can't hurt, so the reference stays.
 void PoseWorld::set_springs(PoseConfig changed) noexcept {
   const PoseConfig before = proxy_.config();
   if (!proxy_.set(changed)) return;

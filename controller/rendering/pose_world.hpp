@@ -1,20 +1,24 @@
-// A rigid tool and its scene as the cycle sees them: wrench in, next pose of the tool out.
+// Computes the next pose of a rigid tool in its scene from the hand's wrench.
 //
-// RenderedWorld's functions handle the tool's position, as for a point. Orientation has its own: set_torque_W() before
-// a step, orientation() after it, turn_to() before start() and resume().
+// RenderedWorld's functions handle the tool's position, as for a point. Further functions handle its orientation:
+// set_torque_W() before a step, orientation() after a step, turn_to() before start() and resume().
 //
-// Limits act on p̂, before 𝒢: its position is projected onto the step's sets (step_limits.hpp), its rotation onto those
-// of turning speed, angle from the orientation at the first start, tilt and twist. A contact may still turn the tool
-// further, like a lever that is pushed at its end. If q leaves the rotation sets by more than 1 µrad, the step is
-// repeated with these sets as walls. With n the axis about which q turns back into the sets,
+// Limits act on p̂, before 𝒢. The position of p̂ is projected onto the step's sets (step_limits.hpp). The rotation of
+// p̂ is projected onto the sets of turning: turning speed, angle from the orientation at the first start, tilt and
+// twist.
+//
+// A contact may turn the tool beyond the sets of turning, like a lever that is pushed at its end. If q leaves these
+// sets by more than 1 µrad, the step is repeated with a wall, which adds the second term to the minimised function:
 //   ½‖q ⊟ p̂‖²_K + ½ s (nᵀ(q ⊟ p̂)_θ − c)²
-// c is at the set's border, and s is the stiffness of a held orientation, 1e4 (5 cm)² K_xx: the wall yields by 1e-7 rad
-// to 10 Nm. This is 𝒢 with K + s n nᵀ, for p̂ ⊞ (K + s n nᵀ)⁻¹ s c n. There may be up to three walls, since each
-// repetition may leave other sets. If q(k−1) is already outside, as after a hold, a wall turns it back by 1 µrad per
-// step, which is 100 Nm against the contact that holds the tool there; p̂ does the faster return.
+// n: the axis about which q turns back into the sets. c: the angle at the sets' border. s: the stiffness of a held
+// orientation, 1e4 (5 cm)² K_xx, so the wall yields by 1e-7 rad to 10 Nm. The minimum is 𝒢 with K + s n nᵀ for
+// p̂ ⊞ (K + s n nᵀ)⁻¹ s c n. There may be up to three walls, since a repeated step may leave the sets elsewhere. If
+// q(k−1) is already beyond the sets, as after a hold, a wall turns q back by only 1 µrad per step: this is a torque of
+// 100 Nm against the contact that holds the tool there. The projection of p̂ returns the tool faster.
 //
-// Among moving objects a step can't be repeated. There, and for the position, q keeps the limits only as far as
-// contacts bring it nearer to q(k−1). The guards of the setpoints have the last word (docs/tool.md).
+// In a scene with moving objects a step can't be repeated. So the rotation in such scenes, and the position in all
+// scenes, keep the limits only if contacts don't move q from p̂ away from q(k−1). The guards of the setpoints have the
+// last word (docs/tool.md).
 #pragma once
 
 #include <memory>
@@ -32,21 +36,22 @@ namespace proxarm::controller {
 
 struct PoseWorldConfig {
   PoseConfig proxy;
-  TurnSets turn{};  // counted from the orientation at the first start
+  TurnSets turn{};  // angles count from the orientation at the first start
 };
 
 class PoseWorld final : public RenderedWorld {
  public:
-  // Precondition: the scene outlives this object, and `g` is its tool's 𝒢 (scenes/rigid/compile_rigid.hpp).
+  // Precondition: the scene outlives this object, and `g` is the 𝒢 of the scene's tool
+  // (scenes/rigid/compile_rigid.hpp).
   PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, scenes::CompiledScene& scene, const PoseWorldConfig& config);
 
-  // The hand's torque about the rendered point in the next step.
+  // Sets the hand's torque about the rendered point in the next step.
   void set_torque_W(const models::Vec3& torque_W) noexcept { torque_W_ = torque_W; }
-  // For the next start() or resume(): the tool's orientation and angular velocity.
+  // Sets the tool's orientation and angular velocity for the next start() or resume().
   void turn_to(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W) noexcept;
-  // Share of the turning speed limit, 0 to 1.
+  // Limits turning to a share of the turning speed limit, 0 to 1.
   void limit_turning(double share) noexcept { speed_share_ = share; }
-  // Like add_damping(), for turning.
+  // Sets the damping of turning that is added to the user's from the next step on (passivity.hpp).
   void add_turning_damping(double damping_Nms_per_rad) noexcept;
   [[nodiscard]] const PoseConfig& config() const noexcept { return proxy_.config(); }  // includes added damping
   [[nodiscard]] double own_turning_damping_Nms_per_rad() const noexcept { return turning_damping_Nms_per_rad_; }
@@ -55,8 +60,9 @@ class PoseWorld final : public RenderedWorld {
   [[nodiscard]] models::Vec3 angular_velocity_W() const noexcept {
     return proxy_.move().tail<3>() / proxy_.config().period_s;
   }
-  [[nodiscard]] bool turning_limited() const noexcept { return turning_limited_; }  // in the last step
-  // Sets of turning for the next step.
+  // Whether a limit of turning was active in the last step.
+  [[nodiscard]] bool turning_limited() const noexcept { return turning_limited_; }
+  // Returns the sets of turning for the next step.
   [[nodiscard]] TurnSets sets() const noexcept;
 
   void start(const models::Vec3& q_W) noexcept override;
@@ -67,7 +73,7 @@ class PoseWorld final : public RenderedWorld {
   }
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept override;
   void set(const Change& change) noexcept override;
-  // See RenderedTool. A value that would make the proxy's mass indefinite changes nothing.
+  // See RenderedTool. Values with which M₆ (pose_proxy.hpp) isn't positive definite change nothing.
   void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept;
   void set_period(double period_s) noexcept override {
     changes_.set_period(period_s);
@@ -92,11 +98,11 @@ class PoseWorld final : public RenderedWorld {
   LimitedAlgorithm<3> limits_;
   PoseProxy proxy_;
   Touches touches_;
-  WorldStep last_;                               // its touches are stored in touches_
-  models::Twist walls_ = models::Twist::Zero();  // wrench of the rotation walls in the last step
+  WorldStep last_;                               // last_.touches refers to touches_
+  models::Twist walls_ = models::Twist::Zero();  // the walls' wrench in the last step
   models::Vec3 torque_W_ = models::Vec3::Zero(), omega_W_ = models::Vec3::Zero();
-  Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();  // for start() and resume()
-  models::ToolPose home_;                                     // of the first start
+  Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();  // orientation for start() and resume()
+  models::ToolPose home_;                                     // the tool's pose at the first start
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0, speed_share_ = 1.0;
   double turning_damping_Nms_per_rad_, added_Nms_per_rad_ = 0.0;
   bool started_ = false, turning_limited_ = false;

@@ -4,7 +4,7 @@ namespace proxarm::controller {
 
 using models::Vec3;
 
-// With the default damping, J/D already equals TurnSets::braking_s, and nothing is added.
+// The torque is zero with the default damping, since J/D then equals TurnSets::braking_s.
 Vec3 RenderedTool::braking_torque_W() const noexcept {
   const double wanted = inertia_kg_m2() / TurnSets::braking_s, damping = turning_damping_Nms_per_rad();
   if (!(wanted > damping)) return Vec3::Zero();
@@ -38,7 +38,7 @@ void PointTool::set(const Change& change) noexcept {
   if (change.parameter == Parameter::turning_spring) orientation_.set_spring(change.value);
 }
 
-// If no inertia was specified, the tool's isn't subtracted.
+// If the session has no inertia setting, the tool's inertia isn't subtracted.
 void PointTool::hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept {
   world_->set({.parameter = Parameter::mass, .value = proxy_mass_kg});
   behind_sensor_T_ = behind.about_T_kg_m2;

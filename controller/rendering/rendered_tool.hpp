@@ -1,8 +1,8 @@
-// The tool's proxy as the motion sees it, position and orientation: wrench in, next pose out.
+// Computes the tool's next pose, position and orientation, from the hand's wrench.
 //
-// A point tool turns independently of its world, with its own inertia (orientation_proxy.hpp); a shaped tool turns in
-// its world's step (pose_world.hpp). Callers needn't know which. One caller at a time. No allocation, lock or throw
-// after construction.
+// A point tool turns independently of its world, with its own inertia (orientation_proxy.hpp). A tool with a shape
+// turns in its world's step (pose_world.hpp). Callers needn't know which kind of tool it is. One caller at a time.
+// Nothing allocates, locks or throws after construction.
 #pragma once
 
 #include <memory>
@@ -26,60 +26,64 @@ class RenderedTool {
   // Starts at rest at this pose. Angles count from the orientation at the first start.
   virtual void start(const models::Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept = 0;
   // Sets the torque about the rendered point for this period; call before step(). A point tool turns at once; step()
-  // reports a fault of this.
+  // reports the fault if turning has failed.
   virtual void turn(const models::Vec3& torque_W) noexcept = 0;
+  // Whether the tool turns in step(); if false, the tool turns in turn().
   [[nodiscard]] virtual bool turns_in_step() const noexcept = 0;
-  // One period under the hand's force, as in RenderedWorld; includes the torque of the limits of turning.
+  // Moves the tool for one period under the hand's force, like RenderedWorld. The result contains the torque of the
+  // limits of turning.
   virtual WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept = 0;
 
-  // The arm couldn't follow: the proxy continues with velocity v from the place nearest to q_W that the scene lets it
-  // reach. It keeps turning as before; the second form sets orientation and angular velocity. Returns the place.
+  // Call if the arm couldn't follow: the proxy continues with velocity v_W from the place nearest to q_W that the scene
+  // lets it reach. Returns this place. Only the second form sets orientation and angular velocity; with the first form
+  // the tool turns on as before.
   virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W, const Eigen::Quaterniond& R_WT,
                       const models::Vec3& omega_W) noexcept {
     turn_to(R_WT, omega_W);
     return world().resume(q_W, v_W);
   }
-  // Continues turning from R_WT with ω, and moving from its present place q_W with v_W. Returns the place.
+  // Makes the proxy continue from R_WT with omega_W, and from its present place q_W with v_W. Returns its place.
   virtual models::Vec3 turn_on(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W, const models::Vec3& q_W,
                                const models::Vec3& v_W) noexcept = 0;
 
   virtual void set(const Change& change) noexcept = 0;
-  // Changes the figures of the tool behind the sensor, with the proxy's mass. The felt inertia stays.
+  // Sets the proxy's mass and the figures of the tool behind the sensor. The felt inertia doesn't change.
   virtual void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept = 0;
   virtual void set_period(double period_s) noexcept = 0;
-  virtual void limit_turning(double share) noexcept = 0;  // share of the speed limit, 0 to 1
+  virtual void limit_turning(double share) noexcept = 0;  // share of the turning speed limit, 0 to 1
   virtual void add_turning_damping(double damping_Nms_per_rad) noexcept = 0;
 
   [[nodiscard]] virtual const Eigen::Quaterniond& R_WT() const noexcept = 0;
-  [[nodiscard]] virtual models::Vec3 omega_W() const noexcept = 0;  // mean over the last step, rad/s
+  [[nodiscard]] virtual models::Vec3 omega_W() const noexcept = 0;  // mean angular velocity over the last step, rad/s
   [[nodiscard]] virtual bool turns() const noexcept = 0;            // false: the orientation is held
-  [[nodiscard]] virtual bool turning_limited() const noexcept = 0;  // in the last step
-  [[nodiscard]] virtual TurnSets sets() const noexcept = 0;         // of turning, in the next step
+  [[nodiscard]] virtual bool turning_limited() const noexcept = 0;  // a limit of turning was active in the last step
+  [[nodiscard]] virtual TurnSets sets() const noexcept = 0;         // sets of turning for the next step
   [[nodiscard]] virtual double inertia_kg_m2() const noexcept = 0;
-  // The user's damping; and with the added damping.
+  // The damping of turning that the user has set.
   [[nodiscard]] virtual double own_turning_damping_Nms_per_rad() const noexcept = 0;
+  // The damping of turning, added damping included.
   [[nodiscard]] virtual double turning_damping_Nms_per_rad() const noexcept = 0;
   [[nodiscard]] virtual double kinetic_J(const WorldStep& step) const noexcept = 0;
 
-  // Torque that brings turning to rest within TurnSets::braking_s, in addition to the damping.
+  // Returns the torque that must be added to the damping to stop turning with the time constant TurnSets::braking_s.
   [[nodiscard]] models::Vec3 braking_torque_W() const noexcept;
 
   virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
 
  private:
-  // For the next start() or resume().
+  // Sets orientation and angular velocity for the next start() or resume().
   virtual void turn_to(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W) noexcept = 0;
 };
 
 class PointTool final : public RenderedTool {
  public:
-  // behind_sensor_T: as in OrientationConfig, for a later set inertia.
+  // behind_sensor_T: as in OrientationConfig; used when an inertia is set later.
   PointTool(std::unique_ptr<RenderedWorld> world, const OrientationConfig& orientation,
             models::Mat3 behind_sensor_T = models::Mat3::Zero())
       : world_(std::move(world)), orientation_(orientation), behind_sensor_T_(std::move(behind_sensor_T)) {}
 
-  // Angles count from this orientation.
+  // Makes angles count from this orientation.
   void count_from(const Eigen::Quaterniond& R_WT) noexcept { orientation_.count_from(R_WT); }
 
   RenderedWorld& world() noexcept override { return *world_; }

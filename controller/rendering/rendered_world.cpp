@@ -15,17 +15,18 @@ using models::Vec3;
 
 namespace {
 
-constexpr double rounding_m = 1e-12;  // rounding of positions of some metres after a few operations
+constexpr double rounding_m = 1e-12;  // rounding error of positions of some metres after a few operations
 
-// The anchor of the spring of (26): the start position, except for a while after the spring became stiffer and after a
-// hold.
+// The anchor of the spring of (26). It is at the start position, except after the spring has become stiffer and after a
+// hold, while it returns to the start position.
 //
-// With q the proxy and a the anchor, K'(a' − q) = K(a − q) gives the a' that keeps the force when K becomes K'; without
-// a spring before, a' = q. From a' the anchor returns as a driven object moves:
+// q: the proxy's place. r: the anchor's place. When the spring's stiffness K becomes K', the anchor jumps to the r'
+// with K'(r' − q) = K(r − q), which keeps the force; without a spring before (K = 0), r' = q. From r' the anchor
+// returns to the start position like a driven object, at the speed
 //     v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: remaining distance
-// A mass on an undamped spring oscillates with at most v about an anchor that moves at v, and with at most 2v after
-// that anchor has stopped. So with nobody at the handle, the proxy is no faster than 2 v_max = 0.1 m/s. A softer spring
-// makes no jump that could hurt, so its anchor stays.
+// A mass on an undamped spring oscillates with at most v about an anchor that moves at v, and with at most 2v after the
+// anchor has stopped. So with nobody at the handle, the proxy is no faster than 2 v_max = 0.1 m/s. If the spring
+// becomes softer, the force's jump can't hurt, so the anchor doesn't jump.
 template <int N>
 class SpringAnchor {
  public:
@@ -36,7 +37,7 @@ class SpringAnchor {
     home_ = at_ = home;
     speed_ = 0.0;
   }
-  // After a hold the spring starts without force, since the person may have left the handle.
+  // Starts after a hold, without force of the spring, since the person may have left the handle.
   void start_again(const V& q) noexcept {
     at_ = q;
     speed_ = 0.0;
@@ -46,7 +47,7 @@ class SpringAnchor {
     at_ = q - K_before / K * (q - at_);
     speed_ = 0.0;
   }
-  // One period. Returns true if the anchor has moved.
+  // Moves the anchor for one period. Returns true if the anchor has moved.
   bool step(double period_s) noexcept {
     const V way = home_ - at_;
     const double distance_m = way.norm(), a = acceleration_m_per_s2;
@@ -96,9 +97,10 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   Vec3 resume(const Vec3& q_W, const Vec3& v_W) noexcept override {
-    // One evaluation of 𝒢 goes to the nearest place that the scene allows, for any κ. From outside all objects this
-    // leads nearer to the wanted place. From inside one, where limits made the contact give way, 𝒢 moves out at once
-    // over any distance; then the wanted place is used instead.
+    // One evaluation of 𝒢 moves the proxy to the nearest place that the scene allows, for any κ. If the proxy is
+    // outside all objects, this place is nearer to the wanted place. If the proxy is inside an object, because limits
+    // made the contact give way, 𝒢 moves the proxy out of the object, over any distance. So if 𝒢 leads away from the
+    // wanted place, the wanted place is used instead.
     const Vec<N> wanted = space_.from_W(q_W), v = space_.basis().transpose() * v_W;
     if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
     ProxyStart<N> start;
@@ -175,10 +177,10 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
  private:
-  // If the scene excludes the start position (some micrometres off a guide, or inside a wall), the proxy starts at rest
-  // at 𝒢 of that position, with q(k−2) = q(k−1). As a step of (26) the displacement would be a velocity: 21 µm in a
-  // millisecond. Returns false if nothing had to be settled. If limits hold the proxy back, settling takes several
-  // steps.
+  // Moves the start to an allowed place if the scene excludes the start position (some micrometres from a guide, or
+  // inside a wall): the proxy starts at rest at 𝒢 of the start position, with q(k−2) = q(k−1). In a step of (26), the
+  // displacement would become a velocity, such as 21 µm in a millisecond. Returns false if the scene doesn't exclude
+  // the start position. If limits hold the proxy back, several steps are needed.
   bool settle() noexcept {
     unsettled_ = false;
     const Vec<N> before = proxy_.q();
@@ -229,7 +231,7 @@ class WorldOfDimension final : public RenderedWorld {
   std::unique_ptr<Lookahead<N>> ahead_;  // null: no lookahead
   SpringAnchor<N> anchor_;
   Touches touches_;
-  WorldStep last_;  // its touches are stored in touches_
+  WorldStep last_;  // last_.touches refers to touches_
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0;
   bool started_ = false;
   bool unsettled_ = false;  // the proxy may be at a place that the scene excludes

@@ -39,7 +39,7 @@ void SceneChanges::step() noexcept {
   }
 }
 
-// One step of an object's friction. Returns true until it has the wanted value.
+// Makes one step of an object's friction. Returns true until the friction has the wanted value.
 bool SceneChanges::rub(std::size_t index) noexcept {
   Object& object = objects_[index];
   if (object.friction == object.wanted_friction) return false;
@@ -49,8 +49,9 @@ bool SceneChanges::rub(std::size_t index) noexcept {
   return object.friction != object.wanted_friction;
 }
 
-// One step of an object's place. Returns true until it has arrived. An obstacle computes its motion from its last two
-// places. An object that has arrived therefore sends its place a second time: then it is at rest.
+// Makes one step of an object's place. Returns true until the object has arrived. The scene computes an object's motion
+// from the object's last two places, so a place is sent a second time after the object has arrived: the object is then
+// at rest.
 bool SceneChanges::move(std::size_t index) noexcept {
   Object& object = objects_[index];
   if (!object.driven) return false;
@@ -99,7 +100,7 @@ void SceneChanges::archive(fieldbus::StateArchive& state) noexcept {
   state(under_way_);
 }
 
-// Sends an object's friction and last two places to the scene; an obstacle computes its motion from these two.
+// Sends an object's friction and last two places to the scene, which computes the object's motion from these places.
 void SceneChanges::tell_scene(std::size_t index) noexcept {
   Object& object = objects_[index];
   if (object.rubs && object.friction >= 0.0) scene_->set_friction(index, object.friction);
@@ -109,7 +110,8 @@ void SceneChanges::tell_scene(std::size_t index) noexcept {
   drive(index, now_m);
 }
 
-// If nothing has changed since the last call and no change is under way, the scene is up to date.
+// Copies all objects of `other`, and sends them to the scene. If no change is under way, an object that hasn't changed
+// since the last call isn't sent again.
 void SceneChanges::follow(const SceneChanges& other) noexcept {
   const bool idle = !under_way_ && !other.under_way_;
   period_s_ = other.period_s_;

@@ -1,12 +1,12 @@
-// Changes the friction and place of a scene's objects during rendering, without a jump of either.
+// Changes the friction and place of a scene's objects during rendering. Neither friction nor place jumps.
 //
 // A driven object (scenes::Motion::driven) moves straight to its wanted place, at most at speed_m_per_s and
 // acceleration_m_per_s2, and pushes like any moving object:
 //   v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: remaining distance
-// √(2ad) is the speed from which braking at a ends within d. The last step ends exactly at the place. μ changes by at
-// most friction_per_s, so that a sliding proxy feels no jump of force.
+// √(2ad) is the speed from which braking at a ends within d. The last step ends exactly at the wanted place. The
+// friction μ changes by at most friction_per_s, so that the force on a sliding proxy doesn't jump.
 //
-// set() and step() neither allocate, lock nor throw. Without changes, step() only tests one value.
+// set() and step() don't allocate, lock or throw. Without changes, step() only tests one value.
 #pragma once
 
 #include <cstdint>
@@ -26,16 +26,17 @@ class SceneChanges {
   // Precondition: the scene outlives this object.
   SceneChanges(scenes::CompiledScene& scene, double period_s);
 
-  // Handles Parameter::friction of an object with friction and Parameter::position of a driven one; ignores all else.
+  // Begins a change of Parameter::friction of an object with friction, or of Parameter::position of a driven object.
+  // Ignores other changes.
   void set(const Change& change) noexcept;
   void set_period(double period_s) noexcept { period_s_ = period_s; }
-  // Precondition: called before each step of the proxy.
+  // Makes one step of all changes. Precondition: called before each step of the proxy.
   void step() noexcept;
 
-  // Copies the state of `other` into its own scene, compiled from the same file.
+  // Copies the state of `other` into this object's scene. Precondition: both scenes are compiled from one file.
   void follow(const SceneChanges& other) noexcept;
 
-  // Present μ of an object, by its index in the scene; 0 if there is no such object.
+  // Present μ of an object, by its index in the scene; 0 if the scene has no object with this index.
   [[nodiscard]] double friction(std::int32_t object) const noexcept;
   // Present displacement of an object from its place in the scene file, m.
   [[nodiscard]] models::Vec3 position_m(std::int32_t object) const noexcept;

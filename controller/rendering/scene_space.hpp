@@ -1,5 +1,5 @@
-// Converts between W and the n coordinates of a scene (scenes/compiler/compile.hpp): x = Uᵀ(q_W − o). Keeps the
-// component of the start position outside the scene's space.
+// Converts places between W and the N coordinates of a scene (scenes/compiler/compile.hpp): x = Uᵀ(q_W − o). In W, the
+// component of the start position outside the scene's space is kept.
 #pragma once
 
 #include "models/base/state_archive.hpp"
@@ -20,7 +20,7 @@ class SceneSpace {
     start_ = scene_->from_W<N>(q_W);
   }
 
-  // A three-dimensional scene with W's axes has W's own coordinates, so the conversion is exact.
+  // If a three-dimensional scene has W's axes, its coordinates are W's coordinates, so the conversion is exact.
   [[nodiscard]] models::Vec3 to_W(const V& x) const noexcept {
     if constexpr (N == 3) {
       return scene_->to_W<N>(x);

@@ -16,8 +16,7 @@ using models::Vec3;
 
 namespace {
 
-// v_r: speed at which a coupling may release its energy. A hand that leaves a wall faster feels a softer wall, nothing
-// else.
+// Largest speed at which a coupling may release its energy. A hand that leaves a wall faster only feels a softer wall.
 constexpr double release_m_per_s = 0.07;
 
 JointVector largest_torques(const std::vector<description::DriveDescription>& drives) {
@@ -108,7 +107,7 @@ class TorquesOfDimension final : public TorqueRendering {
     return c.stiffness_N_per_m * (rest_W - p_W) - c.damping_Ns_per_m / c.period_s * (p_W - p_k1_W_);
   }
 
-  // Steps the device's limits while the world renders f and its proxy moves by q_step_W. Returns e.
+  // Computes the torques of the device's limits while the world renders f and its proxy moves by q_step_W. Returns e.
   double keep_device(const JointVector& link_rad, const Vec3& f_W, const Vec3& q_step_W,
                      double max_tool_speed_m_per_s) noexcept {
     carried_Nm_ = arm_->gravity_torque(link_rad) + missing_Nm_;
@@ -145,7 +144,8 @@ class TorquesOfDimension final : public TorqueRendering {
   StepLimiter limiter_;
   JointCoupling coupling_;
   JointVector most_Nm_, missing_Nm_, none_;
-  JointVector carried_Nm_, limits_Nm_;  // τ_g + τ_0 and τ_U of this step
+  // Torques of this step: carried_Nm_ = τ_g + τ_0, limits_Nm_ = τ_U.
+  JointVector carried_Nm_, limits_Nm_;
   StepLimits walls_;
   models::ToolKinematics tool_;
   Vec3 p_k1_W_ = Vec3::Zero();
@@ -181,7 +181,7 @@ double torque_share(const JointVector& wanted, const JointVector& base, const Jo
   return share;
 }
 
-// State (x, v, u, x₁): x⁺ = x + T v + T²u/(2m), v⁺ = v + T u/m, u⁺ = −K x − B(x − x₁)/T, x₁⁺ = x.
+// The loop's state is (x, v, u, x₁): x⁺ = x + T v + T²u/(2m), v⁺ = v + T u/m, u⁺ = −K x − B(x − x₁)/T, x₁⁺ = x.
 double coupling_spectral_radius(const ImpedanceConfig& config, double mass_kg) {
   const double K = config.stiffness_N_per_m, B = config.damping_Ns_per_m, T = config.period_s, m = mass_kg;
   Eigen::MatrixXd A(4, 4);

@@ -11,7 +11,8 @@ using models::JointVector;
 
 namespace {
 
-// A double angle is rounded to some 1e-16 rad; an acceleration from three of them is off by 1e-9 rad/s² at 1 kHz.
+// A lag below this counts as zero. An angle is rounded to some 1e-16 rad, so an acceleration from three angles is off
+// by 1e-9 rad/s² at 1 kHz.
 constexpr double lag_tolerance_rad = 1e-13;
 
 }  // namespace
@@ -72,7 +73,7 @@ double JointGuard::choose_speed(const Joint& joint, double wanted_u, double lag,
   cap(-joint.speed_rad_per_s, joint.speed_rad_per_s, Limit::joint_speed);
   cap(-approach_speed(theta - joint.lower_rad, a, T), approach_speed(joint.upper_rad - theta, a, T),
       Limit::joint_range);
-  // Comes after the range and has the last word; the two conflict by rounding at most.
+  // The acceleration comes after the range and has the last word. Acceleration and range conflict by rounding at most.
   cap(u_k1 - a * T, u_k1 + a * T, Limit::joint_acceleration);
   if (std::abs(lag) > lag_tolerance_rad && active.kinds == 0) active.set(Limit::joint_acceleration, bit);
   return u;

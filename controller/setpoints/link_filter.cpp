@@ -22,8 +22,8 @@ void LinkFilter::resume(const JointVector& rad, const JointVector& rad_per_s) no
   rad_per_s_ = rad_per_s;
 }
 
-// With e = q_f − q and q constant over the period:  e(T) = (e + (ė + ωe)T) exp(−ωT),
-//                                                  ė(T) = (ė − ω(ė + ωe)T) exp(−ωT)
+// Solves the filter's equation with e = q_f − q and q constant over the period:
+//   e(T) = (e + (ė + ωe)T) exp(−ωT),   ė(T) = (ė − ω(ė + ωe)T) exp(−ωT)
 JointVector LinkFilter::step(const JointVector& wanted_rad) noexcept {
   if (!filters()) {
     rad_per_s_ = (wanted_rad - rad_) / period_s_;
@@ -38,8 +38,10 @@ JointVector LinkFilter::step(const JointVector& wanted_rad) noexcept {
   return omega * omega * (wanted_rad - rad_) - 2.0 * omega * rad_per_s_;
 }
 
-// From ė(T) of step(), where c is v − ωd for the input q_f + d: (ė(T) − v)/T = a if
+// For the input q_f + d and the speed v of the output, c of step() is v − ωd. From ė(T) of step(), the output's mean
+// acceleration (ė(T) − v)/T is a if
 //   d = (v (exp(ωT) − 1 + ωT) + aT exp(ωT)) / (ω²T)
+// coasting_rad() has a = 0; input_s2() is the factor of a.
 JointVector LinkFilter::coasting_rad() const noexcept {
   if (!filters()) return rad_ + period_s_ * rad_per_s_;
   const double omega = omega_rad_per_s_, T = period_s_;

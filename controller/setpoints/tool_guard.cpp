@@ -14,30 +14,31 @@ using models::Vec3;
 
 namespace {
 
-// 2⁻¹⁰ of a step is 0.5 µm at 0.5 m/s and 1 ms.
+// Ten bisections find the setpoint to 2⁻¹⁰ of a step, 0.5 µm at 0.5 m/s and 1 ms.
 constexpr int bisections = 10;
-// Rounds of a fixed-point iteration: the gears' twist follows from the link angles, and these from the twist. Each
-// round reduces the error fifty times. One round from the extrapolated twist leaves at most 2e-8 rad at usual
-// accelerations; three rounds leave 1e-6 rad at the end of the longest braking distance.
+// Rounds of a fixed-point iteration: the gears' twist follows from the link angles, and the link angles follow from the
+// twist. Each round divides the error by fifty. One round from the extrapolated twist leaves an error of at most 2e-8
+// rad at usual accelerations; three rounds leave 1e-6 rad at the end of the longest braking distance.
 constexpr int quick_rounds = 1, exact_rounds = 3;
-// Share of the speed limits that passes. Drives overshoot by up to 7 % when the guard acts, and the arm must stay
-// within 5 % of its limit. The quick test is stricter and leaves close cases to the exact one.
+// Shares of the speed limits that setpoints may use. Drives overshoot by up to 7 % when the guard acts, and the arm may
+// exceed its limit by at most 5 %. The quick test is stricter than the exact test, which judges close cases.
 constexpr double exact_share = 0.99, quick_share = 0.985, quick_way_m = 1e-4;
 constexpr double touching_m = 1e-10;
-// Tolerances of orientations: setpoints are rounded to counts of some 1e-7 rad; a period's turning is as exact as the
-// kinematics.
+// Tolerances of turning. turned_rad is for orientations, since setpoints are rounded to counts of some 1e-7 rad.
+// turn_rounding_rad is for the turning in a period, which is as exact as the kinematics.
 constexpr double turned_rad = 1e-6, turn_rounding_rad = 1e-9;
-// When the proxy's limits stop the tool at a border, gears twist, and setpoints go some micrometres beyond the border.
-// The guard tolerates this much, so that it doesn't act together with the proxy's limits. It is a fifth of the promised
-// 0.1 mm. With more, the border would feel soft; with less, it would be felt twice.
+// Distance by which setpoints may be beyond a border. When the proxy's limits stop the tool at a border, gears twist,
+// and setpoints go some micrometres beyond the border. With a smaller tolerance the guard would act together with the
+// proxy's limits, and a hand would feel the border twice. With a larger tolerance the border would feel soft. It is a
+// fifth of the promised 0.1 mm.
 constexpr double twist_m = 2e-5;
-// Largest correction for the motors' lead at borders, along each axis. With twist_m it keeps setpoints within the
-// promised 0.1 mm.
+// Largest correction for the motors' lead at borders, along each axis. most_lead_m and twist_m together are less than
+// the promised 0.1 mm.
 constexpr double most_lead_m = 6e-5;
-// The path between two points inside a border may bulge out by half of the promised 0.1 mm.
+// Distance by which the path between two points inside a border may go beyond the border: half of the promised 0.1 mm.
 constexpr double bulge_m = 5e-5;
-// Factor on a temporary speed limit of the tool. Motors with bent gears may be faster for a moment: up to 1.42 times
-// when an arm released in contact begins to move, and more at order 2.
+// Factor on a temporary speed limit of the tool. Motors with bent gears may exceed this limit for a moment: by a factor
+// of up to 1.42 when an arm that is released in contact begins to move, and by a larger factor at order 2.
 constexpr double slowed_share = 1.8;
 
 double depth_in(const Vec3& p, const description::BoxDescription& box) noexcept {
@@ -49,14 +50,15 @@ double depth_in(const Vec3& p, const description::BoxDescription& box) noexcept 
   return depth;
 }
 
-// Allowed depth of a setpoint in a keep-out box by gear twist; in a thin box, a quarter of its thickness.
+// Returns how deep a setpoint may be in a keep-out box because of gear twist: twist_m, but at most a quarter of the
+// box's thickness.
 double twist_in(const description::BoxDescription& box) noexcept {
   double thinnest = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < 3; ++k) thinnest = std::min(thinnest, box.max_m[k] - box.min_m[k]);
   return std::min(twist_m, 0.25 * thinnest);
 }
 
-// Whether the segment enters the box, enlarged by `more`, deeper than twist_in().
+// Whether the segment enters the box, enlarged by `more`, by more than twist_in().
 bool crosses(const Vec3& from, const Vec3& to, const description::BoxDescription& box, double more) noexcept {
   double enters = 0.0, leaves = 1.0;
   const double twist = twist_in(box);
@@ -108,7 +110,7 @@ void ToolGuard::start(const JointVector& target_rad) noexcept {
 ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_per_s, const Vec3* links_W,
                              const TurnSets* turn) noexcept {
   ActiveLimits active;
-  // If the tool is slowed down, the elbow is, too.
+  // A lowered speed limit of the tool lowers the elbow's speed limit in proportion.
   const double share = std::min(1.0, slowed_share * max_speed_m_per_s / limits_.max_tool_speed_m_per_s);
   Limits limit{share * limits_.max_tool_speed_m_per_s, share * limits_.max_elbow_speed_m_per_s, turn};
   if (turn != nullptr) limit.from = orientation(target_rad_ - points_.twist_rad);
@@ -123,7 +125,8 @@ ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_p
   return active;
 }
 
-// The iteration starts from the twist extrapolated from the last two periods.
+// Finds the arm's points at the setpoint theta. The iteration starts from the twist extrapolated from the last two
+// periods.
 void ToolGuard::evaluate(const JointVector& theta, int rounds, ArmPoints& out) const noexcept {
   JointVector twist = 2.0 * points_.twist_rad - twist_k2_rad_;
   for (int round = 0; round < rounds; ++round) {
@@ -141,7 +144,7 @@ double ToolGuard::bend(const JointVector& d) const noexcept {
   return size.dot(curvature_.lazyProduct(size));
 }
 
-// Braking distance in steps of this size: the sum of 1 − kT/t over the periods k = 1 … t/T.
+// Returns the braking distance after a step, as a multiple of this step: the sum of 1 − kT/t for k from 1 to t/T.
 double ToolGuard::braking_steps(double t) const noexcept {
   const double T = period_s_, steps = std::floor(t / T);
   return steps < 1.0 ? 0.0 : steps - 0.5 * steps * (steps + 1.0) * T / t;
@@ -187,9 +190,9 @@ Eigen::Quaterniond ToolGuard::orientation(const JointVector& link_rad) const noe
   return Eigen::Quaterniond(arm_->tool_pose(link_rad).linear()).normalized();
 }
 
-// On the way to rest the tool approaches a limit at the speed of this step; the motors' lead then vanishes. While the
-// tool turns along a limit, straight braking in joint space leaves the limit by a few milliradians; this happens only
-// in a stop.
+// Judges turning in this step and on the way to rest. On this way the tool is assumed to approach a limit as fast as in
+// this step, and the motors' lead vanishes. If the tool turns along a limit, straight braking in joint space takes the
+// tool a few milliradians beyond the limit; this happens only in a stop.
 void ToolGuard::judge_turning(const JointVector& theta, const ArmPoints& at, const Limits& limit, double more_steps,
                               ActiveLimits& out) const noexcept {
   const TurnSets& turn = *limit.turn;
@@ -234,7 +237,8 @@ void ToolGuard::judge_borders(const Vec3& at, const Vec3& rest, double step_bend
   }
 }
 
-// Braking together is weaker than a single joint's braking before the end of its range.
+// Returns theta, limited to setpoints from which each joint can stop before the end of its range. When all joints brake
+// together, a single joint may brake too weakly for this.
 JointVector ToolGuard::within_ranges(JointVector theta) const noexcept {
   const double T = period_s_;
   for (Eigen::Index i = 0; i < theta.size(); ++i) {

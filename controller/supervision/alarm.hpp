@@ -1,4 +1,5 @@
-// Reports a fault to the supervisor, with the number of the cycle. All parts of the cycle use it.
+// Reports faults to the supervisor, with the number of the cycle. All parts of the cycle report faults through an
+// Alarm.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +12,15 @@ namespace proxarm::controller {
 
 class Alarm {
  public:
-  // Precondition: both outlive this object.
+  // Precondition: `supervisor` and `cycle` outlive this object.
   Alarm(Supervisor& supervisor, const std::uint64_t& cycle) noexcept : supervisor_(supervisor), cycle_(cycle) {}
 
-  // `where`: drive index, bus index, or −1 for the sensor and the controller itself (FaultReport).
+  // Reports a fault. `where`: drive index, bus index, or −1 for the sensor and the controller (FaultReport).
   void raise(Fault fault, std::int32_t where = -1, double value = 0.0, double limit = 0.0) noexcept {
     if (supervisor_.reaction(fault) == Reaction::hold) state_.hold_raised = true;
     supervisor_.raise({fault, where, cycle_, value, limit});
   }
-  // A force on the handle during the tare.
+  // Reports a force on the handle during the tare.
   void raise_standing(const models::Vec3& force_W, double limit_N) noexcept {
     supervisor_.raise({.fault = Fault::force_at_start,
                        .cycle = cycle_,

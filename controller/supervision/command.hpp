@@ -1,4 +1,5 @@
-// Orders from a person to a running session, except its end. They enter the cycle from another thread or a script.
+// Defines the orders from a person to a running session; the order to end the session is CycleStatus::request_stop().
+// Orders enter the cycle from another thread or from a script.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +10,11 @@ namespace proxarm::controller {
 
 enum class Order : std::uint8_t {
   none,
-  hold,      // rendering: controlled stop, drives stay enabled. Freeing: ends it
-  resume,    // from a hold: continue rendering; the force rises over ramp_in_s
-  release,   // from a hold: the arm follows the hand slowly, without the scene
-  back_off,  // from a hold: the tool moves `value` metres along the last contact's normal
-  reset,     // after a fault: enable the drives again, into a hold
+  hold,      // in rendering: a controlled stop, after which the drives stay enabled. In freeing: ends freeing
+  resume,    // in a hold: rendering continues; the force rises over ramp_in_s
+  release,   // in a hold: the arm follows the hand slowly, without the scene
+  back_off,  // in a hold: the tool moves `value` metres along the last contact's normal
+  reset,     // after a fault: the drives are enabled again, and a hold begins
 };
 
 struct Command {

@@ -10,12 +10,12 @@ using models::JointVector;
 
 namespace {
 
-constexpr double behind_share = 0.5;  // of following_error_rad
-constexpr double forgetting = 0.05;
-constexpr double passing_s = 0.05;  // half a period of 10 Hz: setpoints that wait for a standing joint swing at 15 to
-                                    // 20 Hz
-constexpr int fewest_cycles = 5;    // with a drive away: a single one may be a late frame
-// Share of the torque with which a drive must be able to accelerate its rotor.
+constexpr double behind_share = 0.5;  // share of following_error_rad
+constexpr double forgetting = 0.05;   // rate at which a counted time shrinks while its condition isn't met
+// Half a period of 10 Hz. Setpoints that wait for a standing joint oscillate at 15 to 20 Hz.
+constexpr double passing_s = 0.05;
+constexpr int fewest_cycles = 5;  // fewest cycles with a drive away: in a single cycle, a frame may be late
+// Share of J_r a, the torque with which every drive can accelerate its rotor.
 constexpr double holding_share = 0.1;
 
 double counted(double time_s, bool is_so, double period_s) noexcept {
@@ -67,7 +67,7 @@ void DriveMonitor::follow(Eigen::Index i, const DriveReports& now, double period
   envelope_.step(i, now.setpoint_rad[i], period_s, lag_s(i, now, period_s));
 }
 
-// From the first cycle of braking on, the envelope stays at the end of braking.
+// In the first cycle of braking, widens the envelope to the interval in which the drive stops. It then stays constant.
 void DriveMonitor::brake(Eigen::Index i, const DriveReports& now, double period_s) noexcept {
   const auto bit = static_cast<std::uint8_t>(1u << i);
   if ((state_.braking & bit) != 0) return;
@@ -78,7 +78,8 @@ void DriveMonitor::brake(Eigen::Index i, const DriveReports& now, double period_
   envelope_.widen(i, down * down / (2.0 * a), up * up / (2.0 * a));
 }
 
-// A drive that takes no setpoints yet should stay where it is.
+// Begins to judge a drive. The envelope begins at the setpoint. If the drive takes no setpoints yet, the envelope
+// begins at its reported position, at which it should stay.
 void DriveMonitor::begin(Eigen::Index i, const DriveReports& now) noexcept {
   const auto bit = static_cast<std::uint8_t>(1u << i);
   const double from_rad = (now.following & bit) != 0 ? now.setpoint_rad[i] : now.reported_rad[i];
@@ -91,7 +92,7 @@ void DriveMonitor::begin(Eigen::Index i, const DriveReports& now) noexcept {
   state_.passing_s[i] = passing_s;
 }
 
-// `away` is at most the distance outside the envelope; motion within it doesn't count.
+// Updates `away` and the counted times. `away` is at most d, so motion within the envelope doesn't count.
 void DriveMonitor::watch(Eigen::Index i, const DriveReports& now, bool waits, double period_s) noexcept {
   const double theta = now.reported_rad[i], d = envelope_.outside_rad(i, theta);
   const double moved = theta - std::exchange(state_.last_rad[i], theta), away = state_.away_rad[i] + moved;

@@ -42,7 +42,7 @@ bool EnablingInput::on_frame(std::size_t bus, const fieldbus::CanFrame& frame, s
   const Position position = position_by(frame);
   if (position == Position::squeezed) squeezed_ = true;
   if (position == Position::released) squeezed_ = false;
-  // With three positions, the middle one counts only if it follows the released one.
+  // With three positions, the middle position counts only after the released position.
   const bool says = position == Position::middle && (!panic_ || pressed_ || released_before_);
   if (says && released_before_) pressed_anew_ = true;
   released_before_ = position == Position::released;

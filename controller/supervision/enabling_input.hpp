@@ -1,21 +1,21 @@
-// The person's enabling switch (dead man's switch), received as a bit on a CAN bus: in a TPDO of a drive, or in a
+// Reads the person's enabling switch (dead man's switch) from a bit on a CAN bus: in a TPDO of a drive, or in a
 // separate message.
 //
 // The switch counts as released while its state is unknown: before the first message, if the last message is older than
-// the timeout, or if the message is too short to contain the bit. To start or continue, the person must press it anew:
-// one message must report it released and the next one pressed, with no gap beyond the timeout. A switch that is held,
-// tied down or stuck at "pressed" never starts anything.
+// the timeout, or if the message is too short to contain the bit. To start or continue, the person must press the
+// switch anew: one message must report "released", and the next message, within the timeout, must report "pressed". A
+// switch that is held, tied down or stuck at "pressed" never starts anything.
 //
-// A three-position switch has a second contact, which closes when it is squeezed through (IEC 60204-1, 10.9):
+// A three-position switch has a second contact, which closes when the switch is squeezed through (IEC 60204-1, 10.9):
 //
-//   contacts (middle, panic)   position    before                 then
+//   contacts (middle, panic)   position    state before           new state
 //   0, 0                       released    any                    released
 //   1, 0                       middle      released               pressed, anew
 //   1, 0                       middle      pressed                pressed
-//   1, 0                       middle      squeezed, or unknown   not pressed until released
+//   1, 0                       middle      squeezed, or unknown   not pressed, until it was released
 //   0, 1 and 1, 1              squeezed    any                    squeezed, not pressed
-//   none, or too old           unknown     any                    not pressed; squeezed stays
-// So the way back from the third position through the middle one enables nothing.
+//   no message, or too old     unknown     any                    not pressed; if squeezed, still squeezed
+// So a switch that returns from the third position through the middle position enables nothing.
 #pragma once
 
 #include <cstddef>
@@ -30,20 +30,20 @@ namespace proxarm::controller {
 
 class EnablingInput {
  public:
-  // `bus`: index in the network. Precondition: the cell has the drive named in `input`.
+  // `bus`: the bus's index in the network. Precondition: the cell has the drive that `input` names.
   EnablingInput(const description::EnablingInputDescription& input, const description::Cell& cell, std::size_t bus);
 
   [[nodiscard]] std::size_t bus() const noexcept { return bus_; }
-  // Identifier as in the lists of fieldbus::CanFilter: with extended_id_flag if it has 29 bits.
+  // The message's identifier, with extended_id_flag if it has 29 bits, as in the lists of fieldbus::CanFilter.
   [[nodiscard]] std::uint32_t wanted_id() const noexcept;
 
-  // Returns true if the frame is the switch's message. Precondition: only the cycle's thread calls this and all
-  // functions below.
+  // Takes a received frame. Returns true if it is the switch's message. Precondition of this function and all functions
+  // below: only the cycle's thread calls them.
   bool on_frame(std::size_t bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
-  // Drops a message that has become too old. Precondition: called in each cycle before the others.
+  // Forgets the last message if it has become too old. Precondition: called in each cycle before the functions below.
   void on_cycle(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool pressed() const noexcept { return pressed_; }
-  // The switch was squeezed through and not released since; always false with two positions.
+  // Whether the switch was squeezed through and hasn't been released since; always false with two positions.
   [[nodiscard]] bool squeezed() const noexcept { return squeezed_; }
   // Returns true once per press after a release, while the switch is still pressed.
   [[nodiscard]] bool take_press() noexcept;
@@ -54,7 +54,7 @@ class EnablingInput {
 
  private:
   enum class Position : std::uint8_t { unknown, released, middle, squeezed };
-  // A bit of the message's data, and its value when the contact is closed.
+  // A bit of the message's data, and the bit's value when the contact is closed.
   struct Contact {
     std::size_t byte = 0;
     std::uint8_t mask = 0;

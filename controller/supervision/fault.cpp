@@ -17,16 +17,16 @@ constexpr const char* unconfirmed =
     "the arm was told to stop and to switch off, but not every drive has confirmed it: keep away until its power is "
     "off";
 
-// One row per fault: reaction, cause and advice. The cause may contain %s for the place and %.4g for value and limit.
-// Texts of faults that occur only at a start say that nothing has moved.
+// One row for each fault: reaction, cause and advice. A fault that occurs only at a start also has `did`, which says
+// that nothing has moved.
 struct FaultText {
   Fault fault;
   const char* name;
-  Reaction reaction;  // unless the cell chooses another (description::reaction_choices())
+  Reaction reaction;  // the reaction if the cell doesn't choose another one (description::reaction_choices())
   const char* cause;
-  const char* unit;  // of value and limit; nullptr: no figures
+  const char* unit;  // unit of value and limit; nullptr: value and limit aren't printed
   const char* advice;
-  const char* did = nullptr;  // what the arm did; nullptr: as the reaction says
+  const char* did = nullptr;  // what the arm did; nullptr: the text for the reaction
 };
 
 constexpr std::array texts{
@@ -178,7 +178,7 @@ const char* did(const FaultText& text, Reaction reaction) noexcept {
   return reaction == Reaction::stop_0 ? at_once : reaction == Reaction::hold ? held : stopped;
 }
 
-// The fault with place and cycle, and its cause.
+// Returns the fault's name, place, cause and cycle.
 std::string seen(const FaultReport& report, const std::string& where) {
   const FaultText& text = text_of(report.fault);
   std::string line = text.name;
@@ -193,16 +193,18 @@ std::string seen(const FaultReport& report, const std::string& where) {
   return line + " at cycle " + std::to_string(report.cycle);
 }
 
-constexpr double mostly = 0.9;  // share of a vector along a direction: within 26 degrees
+// A vector counts as pointing along an axis if its component along this axis is at least this share of its length, that
+// is within 26 degrees.
+constexpr double mostly = 0.9;
 
-// Two digits; from 10 on a whole number.
+// Returns the number with two digits; from 10 on as a whole number.
 std::string two_digits(double number) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), number < 10.0 ? "%.2g" : "%.0f", number);
   return text.data();
 }
 
-// "+x", or the unit vector if no axis is near.
+// Returns the axis along which v points, such as "+x", or the unit vector if v points along no axis.
 std::string direction_text(const std::array<double, 3>& v) {
   const double length = std::hypot(v[0], v[1], v[2]);
   for (std::size_t i = 0; i < v.size(); ++i) {

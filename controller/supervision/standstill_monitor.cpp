@@ -16,7 +16,7 @@ StandstillVerdict StandstillMonitor::step(const models::JointVector& reported_ra
   for (Eigen::Index i = 0; i < reported_rad.size(); ++i) {
     if ((fresh & 1u << i) == 0) continue;
     const double away_rad = std::abs(reported_rad[i] - state_.stood_rad[i]);
-    // Negated, so that NaN counts as motion.
+    // The condition is negated so that NaN counts as motion.
     if (!(away_rad <= tolerance_rad_)) {
       return {Fault::standstill_left, static_cast<int>(i), away_rad, tolerance_rad_};
     }

@@ -1,11 +1,10 @@
-// Monitored standstill: while the arm should stand (in a hold at rest, and during the tare), each joint must stay at
-// its position.
+// Detects joints that move while the arm should stand, in a hold at rest and during the tare (monitored standstill).
 //
-//   |θ(k) − θ(s)| > ε   is standstill_left,   ε = limits.following_error_rad,
-// s: the first cycle after the arm has stood for 0.2 s, several times a drive's lag. ε is the deviation from its
-// setpoint that the cell allows a drive at standstill; at 0.8 m, 1 mrad is 0.8 mm. In the shipped scenes, drives that
-// hold stay within 0.024 mrad, even while a hand leans on the tool. An encoder without an answer isn't judged in that
-// cycle: feedback_late and drive_silent cover it.
+//   |θ(k) − θ(s)| > ε   raises standstill_left,   ε = limits.following_error_rad
+// θ: a motor encoder's angle. s: the last cycle before the arm has stood for 0.2 s, several times a drive's lag. ε is
+// the deviation from its setpoint that the cell allows a drive at standstill; at 0.8 m, 1 mrad is 0.8 mm. In the
+// shipped scenes, drives that hold stay within 0.024 mrad, even while a hand leans on the tool. A drive that hasn't
+// answered in a cycle isn't judged in this cycle; the faults feedback_late and drive_silent are for missing answers.
 #pragma once
 
 #include <cstdint>
@@ -30,8 +29,8 @@ class StandstillMonitor {
     state_.stood_rad.setZero(axes);
   }
 
-  // Call in each cycle with the motor encoders' angles, the bits of those that answered, and whether the arm should
-  // stand. Returns the first joint that moves.
+  // Call in each cycle. reported_rad: the motor encoders' angles. `fresh`: bits of the drives that answered. `stands`:
+  // the arm should stand. Returns the first joint that moves.
   StandstillVerdict step(const models::JointVector& reported_rad, std::uint8_t fresh, bool stands,
                          double period_s) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
@@ -39,7 +38,7 @@ class StandstillMonitor {
  private:
   struct State {
     models::JointVector stood_rad;  // θ(s)
-    double stands_s = 0.0;          // time for which the arm should have stood
+    double stands_s = 0.0;          // time since the arm should stand
   };
 
   double tolerance_rad_;

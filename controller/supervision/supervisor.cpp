@@ -49,13 +49,14 @@ constexpr std::array events{"begin", "enabled", "reenabled", "tared",   "hold", 
                             "stop",  "fault",   "fault_off", "at_rest", "disabled", "wait",   "reset"};
 static_assert(phases.size() == phase_count && events.size() == event_count);
 
-// Whether a drive moves without a command.
+// Whether this fault means that a drive moves without a command.
 bool is_astray(Fault fault) noexcept {
   return fault == Fault::drive_deviates || fault == Fault::position_implausible || fault == Fault::tool_too_fast ||
          fault == Fault::elbow_too_fast;
 }
 
-// Whether this fault makes drives report faults: these aren't a second fault, and the drives' own ramps stop them.
+// Whether this fault makes drives report faults. The drives' reports then don't count as a second fault: the drives
+// stop by ramps of their own.
 bool makes_drives_faulty(Fault fault) noexcept {
   switch (fault) {
     case Fault::drive_silent:
@@ -99,7 +100,7 @@ bool Supervisor::handle(Event event) noexcept {
   return true;
 }
 
-// Precondition: called at most once per fault and cycle.
+// Counts a fault. Further calls for a fault in one cycle have no effect.
 void Supervisor::note(const FaultReport& report) noexcept {
   Notice& notice = notices_[static_cast<std::size_t>(report.fault)];
   if (notice.last == report.cycle + 1) return;
@@ -108,8 +109,9 @@ void Supervisor::note(const FaultReport& report) noexcept {
   notice.last = report.cycle + 1;
 }
 
-// While the arm stops, no drive may move uncontrolled: power is cut. A drive that only reports a fault while the others
-// brake is no reason, unless another fault came before.
+// Whether a fault turns the stop in progress into stop category 0. While drives are switched off, a drive that moves
+// uncontrolled does. While the arm stops or drives are switched off, a drive that reports a fault does only if it is a
+// second fault, whose first fault didn't make drives report faults.
 bool Supervisor::escalates(Fault fault) const noexcept {
   if (fault == Fault::drive_fault) {
     const bool second = faulted() || phase_ == Phase::disabling;
@@ -121,7 +123,7 @@ bool Supervisor::escalates(Fault fault) const noexcept {
 Reaction Supervisor::reaction_now(Fault fault) const noexcept {
   if (escalates(fault)) return Reaction::stop_0;
   const Reaction reaction = reactions_[static_cast<std::size_t>(fault)];
-  // In this phase the arm can't be held, because the drives aren't enabled.
+  // The arm can be held only in rendering, holding and freeing. In other phases the reaction is a stop instead.
   return reaction == Reaction::hold && !live() ? Reaction::stop_1 : reaction;
 }
 
@@ -157,7 +159,7 @@ void Supervisor::give_up_hold() noexcept {
 }
 
 void Supervisor::rescale(std::uint64_t cycle, double ratio) noexcept {
-  // Converts a cycle's number plus one (0: none). Rounds towards the present, so that nothing ends too early.
+  // Converts a cycle's number plus one (0: no such cycle). Rounds towards the present, so that nothing ends too early.
   const auto at = [&](std::uint64_t end) {
     if (end == 0 || end > cycle) return end;
     const double age = std::floor(ratio * static_cast<double>(cycle - end));

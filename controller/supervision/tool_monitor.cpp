@@ -20,12 +20,12 @@ ToolVerdict ToolMonitor::step(const models::Vec3& tool_W, double elbow_moved_m, 
   }
   period_s_ = period_s;
   const double cycles = std::clamp(std::round(monitored_s / period_s), 1.0, static_cast<double>(most_places));
-  // Soon after the start the window begins at the start.
+  // Until W has passed since the start, the window begins at the start.
   const auto window = std::min(count_, static_cast<std::uint32_t>(cycles));
   elbow_moved_m_[count_ % most_places] = elbow_moved_m;
   ToolVerdict verdict = judge_speeds(tool_W, window, period_s);
   places_[count_ % most_places] = tool_W;
-  // count_ only identifies the oldest place.
+  // A large count_ is reduced without changing its places in the rings.
   count_ = count_ + 1 < 2 * most_places ? count_ + 1 : most_places;
   if (verdict.fault == Fault::none && off_m > allowed_m_ + off_limits_m) {
     verdict = {Fault::tool_off_limits, 1e3 * off_m, 1e3 * (allowed_m_ + off_limits_m)};
@@ -38,7 +38,7 @@ double ToolMonitor::most_way_m(double speed_m_per_s, double window_s, double per
          rounding_m;
 }
 
-// Over the last `window` cycles, against the distance allowed over all of W.
+// Compares the motion in the last `window` cycles with the distance that is allowed in W.
 ToolVerdict ToolMonitor::judge_speeds(const models::Vec3& tool_W, std::uint32_t window,
                                       double period_s) const noexcept {
   if (window == 0) return {};

@@ -14,7 +14,7 @@ namespace {
 
 using description::SetupError;
 
-// Decimal with at most `digits` places, no trailing zeros.
+// Returns the number as text with at most `digits` decimals, without trailing zeros.
 std::string number(double value, int digits) {
   char text[64];
   std::snprintf(text, sizeof text, "%.*f", digits, value);
@@ -79,8 +79,9 @@ void check_pairs(const PlannedBus& bus) {
       const PlannedFrame &one = bus.frames[k], &two = bus.frames[i];
       if (one.name == two.name) refuse(bus, two, "two frames have this name");
       if (one.id != two.id || one.shape.extended != two.shape.extended) continue;
-      if (two.after == one.name || one.after == two.name) continue;  // an answer on its question's identifier
-      if (!two.sender.empty() && two.sender == one.sender && !two.after.empty()) continue;  // never both pending
+      if (two.after == one.name || one.after == two.name) continue;  // an answer may use its question's identifier
+      // One sender, and the frames are never pending at the same time.
+      if (!two.sender.empty() && two.sender == one.sender && !two.after.empty()) continue;
       refuse(bus, two, "has the same identifier as \"" + one.name + "\"; give one of them another");
     }
   }
@@ -99,7 +100,7 @@ void check(const PlannedBus& bus, std::int64_t period_ns) {
   check_pairs(bus);
 }
 
-// Instances per cycle: maximum and mean.
+// Return how often the frame is sent in one cycle: at most, and on average.
 int most_in_a_cycle(const PlannedFrame& frame, std::int64_t period_ns) {
   return frame.every_ns > 0 ? static_cast<int>((period_ns + frame.every_ns - 1) / frame.every_ns) : 1;
 }
@@ -127,7 +128,7 @@ void add_up(const PlannedBus& bus, BusPlan& plan) {
   plan.mean_worst_load = mean_ns / period_ns;
 }
 
-// Mean wire time of a frame with its usual data.
+// Returns the mean wire time of a frame with its usual data, in ns.
 double typical_ns(const PlannedFrame& frame, const BitRates& rates, std::mt19937& random) {
   std::vector<CanFrame> frames = frame.typical;
   for (int i = 0; frame.typical.empty() && i < 64; ++i) {
@@ -184,7 +185,7 @@ void bound_responses(const PlannedBus& bus, BusPlan& plan) {
   }
 }
 
-// Complete plan, except for the alternatives.
+// Returns the complete plan except for the alternatives.
 BusPlan analyse(const PlannedBus& bus, std::int64_t period_ns) {
   BusPlan plan;
   plan.name = bus.name;
@@ -208,7 +209,7 @@ void give_reasons(BusPlan& plan) {
       need = "the frames take " + need + " at worst";
     }
     plan.reasons.push_back(need + ", a cycle has " + microseconds(plan.period_ns));
-    return;  // a list of all late frames wouldn't help
+    return;  // one reason is enough: a list of all late frames wouldn't help
   }
   for (const FramePlan& frame : plan.frames) {
     if (!frame.bounded) {
@@ -220,7 +221,7 @@ void give_reasons(BusPlan& plan) {
   }
 }
 
-// The shortest timestep that fits, above the given one, in steps of 0.25 ms.
+// Returns the shortest timestep above `above_ns` with which the bus fits, in steps of 0.25 ms.
 std::optional<std::int64_t> shortest_period(const PlannedBus& bus, std::int64_t above_ns) {
   constexpr std::int64_t quarter = 250'000, longest = 20'000'000;
   for (std::int64_t period_ns = (above_ns / quarter + 1) * quarter; period_ns <= longest; period_ns += quarter) {
@@ -232,7 +233,7 @@ std::optional<std::int64_t> shortest_period(const PlannedBus& bus, std::int64_t 
   return std::nullopt;
 }
 
-// Number of buses that could share the frames evenly. Each bus needs the SYNC.
+// Returns the number of buses among which the frames could be divided evenly. Each of these buses needs the SYNC.
 std::optional<int> enough_buses(const PlannedBus& bus, const BusPlan& plan) {
   const BitRates rates{bus.bitrate, bus.data_bitrate};
   std::int64_t sync_ns = 0;
@@ -245,7 +246,7 @@ std::optional<int> enough_buses(const PlannedBus& bus, const BusPlan& plan) {
   return std::nullopt;
 }
 
-// The same frames as CAN FD; frames without data, such as the SYNC, stay classic.
+// Returns the bus with its frames as CAN FD frames. Frames without data, such as the SYNC, stay classic.
 PlannedBus as_fd(const PlannedBus& bus, std::int64_t data_bitrate) {
   PlannedBus fd = bus;
   fd.data_bitrate = data_bitrate;

@@ -7,20 +7,24 @@
 //   BusPlan plan = plan_bus(bus, 1'000'000);       // plan.fits, plan.worst_load, plan.frames[1].response_ns ...
 //   std::cout << plan_text(plan);
 //
-// Every frame is assumed at its maximum length (can_timing.hpp). The worst response of a frame m is bounded by
-// response-time analysis for non-preemptive fixed priorities (Tindell & Burns 1994; Davis, Burns, Bril & Lukkien 2007;
-// first in, first out queues as in Davis, Kollmann, Pollex & Slomka 2011), with offsets. Frame m, released at r .. r +
-// J in the cycle, begins at
+// Every frame is assumed to have its maximum length (can_timing.hpp). The worst response time of a frame m is bounded
+// by response-time analysis for non-preemptive fixed priorities (Tindell & Burns 1994; Davis, Burns, Bril & Lukkien
+// 2007; first in, first out queues as in Davis, Kollmann, Pollex & Slomka 2011), with offsets:
+// 1. Frame m is released at a time between r and r + J in the cycle (J is its release jitter).
+// 2. A busy period that contains m begins at a time s.
+// 3. B is the wire time of the longest lower-priority frame that can be on the wire at s. "Lower priority" means: lower
+//    than the priority of every frame that can precede m in its sender's queue. B is a single frame, because no
+//    lower-priority frame starts while m waits.
+// 4. C_k is the longest wire time of a frame k. N_k(s, b) is how often frame k can be released in [s, b]. The sum is
+//    over the frames k that have a higher priority than m, or that can precede m in its sender's queue.
+// 5. m begins at the least solution b of
 //
-//   b = s + B + sum C_k N_k(s, b)          the least solution; m ends at b + C_m
+//   b = s + B + sum C_k N_k(s, b)
 //
-// in the busy period that begins at s. The worst s is taken.
-//   B       the longest lower-priority frame that can be on the wire at s: one, as none starts while m waits
-//   C_k N_k the wire time of the frames that can be released in [s, b] and have a higher priority than m or precede
-//           m in its sender's queue
-// "Lower priority" means lower than that of every frame that can precede m in its queue. Release times, and J of a
-// frame that comes after another, depend on the other frames' results: all are increased together until none changes. A
-// test checks that no run of the in-process bus exceeds these bounds.
+//   and ends at b + C_m. The largest end over all possible s is the bound.
+// 6. If a frame comes after another frame, its release time and J depend on the other frame's bound. So all bounds are
+//    increased together until no bound changes.
+// A test checks that no run of the in-process bus exceeds these bounds.
 #pragma once
 
 #include <cstdint>
@@ -31,33 +35,39 @@
 
 namespace proxarm::fieldbus {
 
-// One frame of every cycle, or of every n-th.
+// One frame that is sent in every cycle or in every n-th cycle.
 struct PlannedFrame {
   std::string name;  // unique on its bus
   std::uint32_t id = 0;
   FrameShape shape{};
-  std::string sender{};  // a sender's frames leave in the order of queuing
+  std::string sender{};  // frames of one sender leave in the order in which they were queued
 
-  // Queued at `release` (fraction of the period after the cycle's start) or, with `after`, when that frame has arrived;
-  // plus delay_ns to latest_delay_ns. Frames queued at the same time leave in the order of the list.
-  double release = 0.0;
+  // The frame is queued between delay_ns and latest_delay_ns after its release. Its release is `release`, or the
+  // arrival of the frame `after` if `after` isn't empty. Frames that are queued at the same time leave in the order of
+  // the list.
+  double release = 0.0;  // fraction of the period after the cycle's start
   std::string after{};
   std::int64_t delay_ns = 0;
-  std::int64_t latest_delay_ns = 0;  // below delay_ns: the same as delay_ns
-  bool any_time = false;             // not in step with the cycle: heartbeats, SDO, emergencies
-  int every_cycles = 1;              // sent once in this many cycles
-  std::int64_t every_ns = 0;  // any_time: by the sender's clock, as a streaming sensor does; 0: every_cycles counts
+  std::int64_t latest_delay_ns = 0;  // if below delay_ns, delay_ns is used
+  // The frame isn't in step with the cycle, like heartbeats, SDOs and emergencies.
+  bool any_time = false;
+  int every_cycles = 1;  // the frame is sent once in this many cycles
+  // Used with any_time: the sender's clock sends the frame with this period, as in a streaming sensor; 0: every_cycles
+  // is used.
+  std::int64_t every_ns = 0;
 
-  double deadline = 1.0;  // latest end, fraction of the period after the cycle's start (any_time: after queuing)
+  // Latest end of the frame as a fraction of the period: after the cycle's start, or after queuing with any_time.
+  double deadline = 1.0;
   bool sync = false;
 
-  std::vector<CanFrame> typical{};  // examples of its usual data, for the typical load; empty: random data
+  // Frames with usual data, for the typical load; if empty, random data are used.
+  std::vector<CanFrame> typical{};
 };
 
 struct PlannedBus {
   std::string name;
   std::int64_t bitrate = 1'000'000;
-  std::int64_t data_bitrate = 0;  // CAN FD; 0: classic
+  std::int64_t data_bitrate = 0;  // bit/s of the CAN FD data phase; 0: the bus is classic
   std::vector<PlannedFrame> frames;
 };
 
@@ -65,11 +75,13 @@ struct FramePlan {
   std::string name;
   std::uint32_t id = 0;
   bool extended = false;
-  std::int64_t wire_ns = 0;      // its longest time on the wire
+  std::int64_t wire_ns = 0;      // the frame's longest time on the wire
   std::int64_t response_ns = 0;  // worst case, from queuing to the end of the frame
-  std::int64_t finish_ns = 0;    // worst case, from the cycle's start (any_time: response_ns)
+  // Worst case, from the cycle's start to the end of the frame; with any_time it equals response_ns.
+  std::int64_t finish_ns = 0;
   std::int64_t deadline_ns = 0;
-  bool bounded = true;  // false: it can wait longer than a period, and the figures above are meaningless
+  // false: the frame can wait longer than its repetition time, and response_ns and finish_ns are meaningless.
+  bool bounded = true;
   [[nodiscard]] bool in_time() const noexcept { return bounded && finish_ns <= deadline_ns; }
 };
 
@@ -78,32 +90,40 @@ struct BusPlan {
   std::int64_t period_ns = 0;
   std::int64_t bitrate = 0;
   std::int64_t data_bitrate = 0;
-  // For a cycle in which every frame is due, interframe space included.
+  // The next six members describe a cycle in which every frame is due, with interframe spaces. worst: all frames have
+  // their maximum length; least: all have their minimum length.
   int worst_bits = 0;
   int least_bits = 0;
   std::int64_t worst_ns = 0;
   std::int64_t least_ns = 0;
-  double worst_load = 0.0;  // of that cycle, 1 = all of its time
+  double worst_load = 0.0;  // share of the cycle's time, 1 = the whole cycle
   double least_load = 0.0;
-  double mean_worst_load = 0.0;     // average over many cycles (every n-th: 1/n), frames at maximum length
-  double typical_load = 0.0;        // the same with usual data, stuff bits included
-  std::int64_t sync_jitter_ns = 0;  // the longest other frame, which can hold the SYNC back
+  // Average load over many cycles; a frame that is sent in every n-th cycle counts 1/n. All frames have their maximum
+  // length.
+  double mean_worst_load = 0.0;
+  double typical_load = 0.0;  // average load over many cycles with usual data, stuff bits included
+  // How long another frame can delay the SYNC: the time of the longest other frame.
+  std::int64_t sync_jitter_ns = 0;
   std::vector<FramePlan> frames;
-  std::vector<std::string> outranking_sync;  // frames with a higher priority than the SYNC
+  std::vector<std::string> outranking_sync;  // names of the frames whose priority is higher than that of the SYNC
   bool fits = false;
-  std::vector<std::string> reasons;       // why it doesn't fit, with figures
-  std::vector<std::string> alternatives;  // changes with which it would fit
+  std::vector<std::string> reasons;       // why the bus doesn't fit, with numbers
+  std::vector<std::string> alternatives;  // changes with which the bus would fit
 };
 
-// Throws SetupError if the bus can't be planned: invalid bitrate or length, period not above 0, two frames with the
-// same identifier (a frame may answer on the identifier of the one it comes after, as some sensors do), a name given
-// twice, an `after` that doesn't exist or leads in a circle, a CAN FD frame on a classic bus.
+// Computes the plan of a bus. Throws SetupError if the bus can't be planned:
+// - a bitrate or a length is invalid, or the period isn't above 0
+// - two frames have the same identifier; a frame may only use the identifier of the frame that it comes after, as the
+//   answers of some sensors do
+// - a name is given twice
+// - an `after` names no frame, or leads in a circle
+// - a CAN FD frame is on a classic bus
 [[nodiscard]] BusPlan plan_bus(const PlannedBus& bus, std::int64_t period_ns);
 
-// A table of several lines for the user.
+// Returns the plan as a table of several lines for the user.
 [[nodiscard]] std::string plan_text(const BusPlan& plan);
 
-// One line with what is needed, what is available and what would fit. Empty if all fit.
+// Returns one line that says what the frames need, what is available, and what would fit. Empty if all plans fit.
 [[nodiscard]] std::string refusal_text(const std::vector<BusPlan>& plans);
 
 }  // namespace proxarm::fieldbus

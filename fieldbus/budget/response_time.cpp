@@ -8,24 +8,28 @@ namespace proxarm::fieldbus {
 namespace {
 
 constexpr std::int64_t no_bound = std::numeric_limits<std::int64_t>::max();
-constexpr int cycles_back = 2;  // busy periods that began up to this many cycles earlier are examined
+constexpr int cycles_back = 2;  // how many cycles earlier the examined busy periods may begin
 
 std::int64_t floor_divide(std::int64_t a, std::int64_t b) noexcept {
   const std::int64_t quotient = a / b;
   return quotient * b > a ? quotient - 1 : quotient;
 }
 
-// One frame in the busy period of frame m, and when it can be released.
+// A frame that can be in the busy period of frame m.
 struct Competitor {
   std::size_t frame = 0;
-  bool ahead = false;           // from m's sender: counts only if queued before m
-  bool not_this_cycle = false;  // caused by m, or queued behind m: this cycle's instance doesn't delay m
-  bool held_back = false;       // can stand behind a lower-priority frame of its sender
-  std::int64_t jitter_ns = 0;   // of its release, or of reaching the head of its queue
+  bool ahead = false;  // from m's sender: it delays m only if it was queued before m
+  // The frame is caused by m or queued behind m, so its instance in m's cycle doesn't delay m.
+  bool not_this_cycle = false;
+  // The frame can stand in its sender's queue behind a frame with lower priority than `weakest`.
+  bool held_back = false;
+  // Jitter of the frame's release, or of the time when it reaches the head of its queue if held_back.
+  std::int64_t jitter_ns = 0;
 };
 
 struct Level {
-  std::uint64_t weakest = 0;  // lowest priority that can precede m; frames below it count as "lower priority"
+  // Lowest priority of m and of the frames that can precede m; frames below it count as "lower priority".
+  std::uint64_t weakest = 0;
   std::vector<Competitor> competitors;
 };
 
@@ -44,7 +48,8 @@ class Analysis {
   }
 
   std::vector<FrameWindow> run() {
-    // Start from an empty bus. A frame can come after one listed later, hence as many passes as frames.
+    // Start with windows for an empty bus. A frame may come after a frame that is listed later, so there are as many
+    // passes as frames.
     for (std::size_t pass = 0; pass < frames_.size(); ++pass) {
       for (std::size_t m = 0; m < frames_.size(); ++m) {
         windows_[m] = release_of(m);
@@ -62,7 +67,8 @@ class Analysis {
  private:
   [[nodiscard]] std::size_t trigger(std::size_t m) const { return static_cast<std::size_t>(triggers_[m]); }
 
-  // A frame that comes after one out of step is out of step, too, and isn't sent more often.
+  // If a frame comes after another frame that is out of step with the cycle, it is out of step too. It isn't sent more
+  // often than the other frame either.
   void inherit_phase() {
     for (std::size_t pass = 0; pass < frames_.size(); ++pass) {
       for (std::size_t m = 0; m < frames_.size(); ++m) {
@@ -74,7 +80,7 @@ class Analysis {
     }
   }
 
-  // True if the frame's time in the cycle is known; it may not be sent in every cycle.
+  // True if the frame's time in the cycle is known. The frame needn't be sent in every cycle.
   [[nodiscard]] bool in_step(std::size_t k) const { return !frames_[k].any_time; }
   [[nodiscard]] std::int64_t every_ns(std::size_t k) const {
     return frames_[k].every_ns > 0 ? frames_[k].every_ns : period_ns_ * frames_[k].every_cycles;
@@ -97,7 +103,8 @@ class Analysis {
     return window;
   }
 
-  // Windows only grow, and stop at a limit, so the iteration ends. True if this one grew.
+  // Updates the window of frame m. True if the window grew. The iteration ends, because windows only grow, and only up
+  // to a limit.
   bool update(std::size_t m) {
     const FrameWindow old = windows_[m];
     if (!old.bounded) return false;
@@ -116,7 +123,7 @@ class Analysis {
            now.bounded != old.bounded;
   }
 
-  // True if frame k, directly or through others, causes m to be queued in the same cycle.
+  // True if frame k causes frame m, directly or through other frames, to be queued in the same cycle.
   [[nodiscard]] bool leads_to(std::size_t k, std::size_t m) const {
     for (int at = triggers_[m]; at >= 0; at = triggers_[static_cast<std::size_t>(at)]) {
       if (at == static_cast<int>(k)) return true;
@@ -124,14 +131,14 @@ class Analysis {
     return false;
   }
 
-  // True if one sender queues both at the same time, so that the order of the list decides.
+  // True if one sender queues both frames at the same time, so that the order of the list decides which frame is first.
   [[nodiscard]] bool queued_together(std::size_t a, std::size_t b) const {
     return frames_[a].sender == frames_[b].sender && triggers_[a] == triggers_[b] && in_step(a) && in_step(b) &&
            frames_[a].release == frames_[b].release && frames_[a].delay_ns == frames_[b].delay_ns &&
            frames_[a].latest_delay_ns == frames_[b].latest_delay_ns;
   }
 
-  // True if frame k can be pending at some time in [from, to]; always for a frame out of step.
+  // True if frame k can be pending at some time in [from, to]. For a frame out of step this is assumed.
   [[nodiscard]] bool can_be_pending(std::size_t k, std::int64_t from_ns, std::int64_t to_ns) const {
     if (!in_step(k)) return true;
     const FrameWindow& window = windows_[k];
@@ -139,7 +146,7 @@ class Analysis {
     return window.finish_ns + last * period_ns_ > from_ns;
   }
 
-  // True if frame a of the same sender can precede m in its queue.
+  // True if frame a has the same sender as frame m and can precede m in the sender's queue.
   [[nodiscard]] bool can_precede(std::size_t a, std::size_t m) const {
     if (a == m || frames_[a].sender != frames_[m].sender) return false;
     if (!in_step(a) || !in_step(m)) return true;
@@ -155,8 +162,8 @@ class Analysis {
     }
     for (std::size_t k = 0; k < frames_.size(); ++k) {
       const bool same_sender = frames_[k].sender == frames_[m].sender;
-      // (No frame that can precede m has a priority below the weakest.) A frame of m's sender that ended before m was
-      // queued still belongs to the busy period, as it may have delayed others.
+      // By its definition, `weakest` excludes no frame that can precede m. A frame of m's sender that ended before m
+      // was queued stays included: it belongs to the busy period, because it may have delayed other frames.
       if (k == m || priority_[k] > level.weakest) continue;
       Competitor competitor{k, same_sender, leads_to(m, k) || (queued_together(k, m) && k > m), false, 0};
       for (std::size_t l = 0; l < frames_.size(); ++l) {
@@ -169,12 +176,13 @@ class Analysis {
       }
       level.competitors.push_back(competitor);
     }
-    // m's instances of earlier cycles.
+    // Instances of m from earlier cycles.
     level.competitors.push_back({m, true, true, false, windows_[m].jitter_ns});
     return level;
   }
 
-  // Most instances of the competitor that can be released in [start, end]. phase_known: start is a time in m's cycle.
+  // Returns how many instances of the competitor can be released in [start, end] at most. phase_known: `start` is a
+  // time in m's cycle.
   [[nodiscard]] std::int64_t releases(const Competitor& k, std::int64_t start_ns, std::int64_t end_ns,
                                       bool phase_known) const {
     if (end_ns < start_ns) return 0;
@@ -186,7 +194,7 @@ class Analysis {
     return std::clamp<std::int64_t>(last - before, 0, at_any_phase);
   }
 
-  // Worst-case start of m's transmission in a busy period that begins at start_ns, or no_bound.
+  // Returns the worst-case start of m's transmission in a busy period that begins at start_ns, or no_bound.
   [[nodiscard]] std::int64_t begin_of(std::size_t m, const Level& level, std::int64_t start_ns,
                                       std::int64_t blocking_ns, std::int64_t latest_release_ns,
                                       bool phase_known) const {
@@ -194,7 +202,9 @@ class Analysis {
     for (;;) {
       std::int64_t next_ns = start_ns + blocking_ns;
       for (const Competitor& k : level.competitors) {
-        if (k.frame == m && !phase_known) continue;  // m responds within its repetition time, else there is no bound
+        // Earlier instances of m don't count here: if m's response took longer than its repetition time, m would have
+        // no bound.
+        if (k.frame == m && !phase_known) continue;
         const std::int64_t end_ns = k.ahead ? std::min(begin_ns, latest_release_ns) : begin_ns;
         next_ns += worst_ns_[k.frame] * releases(k, start_ns, end_ns, phase_known);
       }
@@ -204,7 +214,8 @@ class Analysis {
     }
   }
 
-  // The longest lower-priority frame that can be on the wire at some time in [from, to].
+  // Returns the wire time of the longest lower-priority frame that can be on the wire at some time in [from, to]; with
+  // `anything`, at any time.
   [[nodiscard]] std::int64_t blocking(std::size_t m, const Level& level, std::int64_t from_ns, std::int64_t to_ns,
                                       bool anything) const {
     std::int64_t longest_ns = 0;
@@ -227,7 +238,7 @@ class Analysis {
     if (window.response_ns > every_ns(m)) window.bounded = false;
   }
 
-  // Any frame may be released at the same moment as m.
+  // Examines a frame m out of step: any other frame may be released at the same moment as m.
   void examine_any_phase(std::size_t m, const Level& level) {
     const std::int64_t blocking_ns = blocking(m, level, 0, 0, true);
     const std::int64_t begin_ns = begin_of(m, level, 0, blocking_ns, 0, false);
@@ -239,8 +250,11 @@ class Analysis {
     }
   }
 
-  // Examines all busy periods that can contain m. Each begins with the release of one of its frames. If it begins later
-  // with the same frames, it also ends later. So it is enough to try the last times at which a frame can be in it.
+  // Examines all busy periods that can contain m:
+  // 1. A busy period begins with the release of one of its frames.
+  // 2. Of two busy periods with the same frames, the one that begins later also ends later.
+  // 3. So among the busy periods with the same frames, only the latest beginning matters. The latest possible
+  //    beginnings are the latest release times of m and of the competitors (`lasts`), and only these are tried.
   void examine_in_step(std::size_t m, const Level& level) {
     const FrameWindow own = windows_[m];
     const std::int64_t latest_ns = own.release_ns + own.jitter_ns;
@@ -253,7 +267,7 @@ class Analysis {
     examine_start(m, level, {m, false, false, false, own.jitter_ns}, 0, lasts);
     for (const Competitor& k : level.competitors) {
       if (!in_step(k.frame)) {
-        // It can begin a busy period at any time up to m's release.
+        // A competitor out of step can begin a busy period at any time up to m's release.
         for (const std::int64_t start_ns : lasts) examine_start_at(m, level, start_ns, blocking(m, level, 0, 0, true));
         continue;
       }
@@ -261,19 +275,20 @@ class Analysis {
     }
   }
 
-  // Last cycle whose instance of the competitor can be released by a time in m's cycle.
+  // Returns the last cycle, counted from m's cycle, whose instance of the competitor can be released until time_ns.
   [[nodiscard]] std::int64_t last_cycle(const Competitor& k, std::int64_t time_ns) const {
     const std::int64_t last = floor_divide(time_ns - windows_[k.frame].release_ns, period_ns_);
     return k.not_this_cycle ? std::min<std::int64_t>(last, -1) : last;
   }
 
-  // Busy periods that begin with the release of frame `first` in cycle n.
+  // Examines the busy periods that begin with the release of frame `first` in cycle n (0 is m's cycle).
   void examine_start(std::size_t m, const Level& level, const Competitor& first, std::int64_t n,
                      const std::vector<std::int64_t>& lasts) {
     const std::int64_t from_ns = windows_[first.frame].release_ns + n * period_ns_;
     const std::int64_t to_ns = from_ns + first.jitter_ns;
     const PlannedFrame& frame = frames_[first.frame];
-    // A frame queued at the very end of another takes part in the next arbitration, so no other frame blocks it.
+    // A frame that is queued exactly at the end of another frame takes part in the next arbitration, so no
+    // lower-priority frame blocks it.
     const bool at_end = triggers_[first.frame] >= 0 && frame.delay_ns == 0 && frame.latest_delay_ns <= 0;
     std::int64_t blocking_ns = 0;
     if (first.held_back) {

@@ -13,7 +13,7 @@ void BusStatistics::reset(std::int64_t now_ns) noexcept {
   since_ns_ = now_ns;
   busy_ns_ = window_busy_ns_ = peak_busy_ns_ = 0;
   window_end_ns_ = now_ns + window_ns_;
-  add_busy(now_ns, busy_until_ns_);  // rest of a frame in progress
+  add_busy(now_ns, busy_until_ns_);  // counts the rest of a frame in progress
   frames_ = bits_ = collisions_ = 0;
   identifiers_.clear();
   index_of_base_id_.fill(0);

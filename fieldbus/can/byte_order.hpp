@@ -1,6 +1,7 @@
-// Reads and writes numbers in the bytes of a frame, independent of the machine's byte order.
+// Reads and writes numbers in the bytes of a frame, independent of the machine's byte order. The suffix _le means
+// little-endian, _be big-endian.
 //
-// Precondition: `bytes` is long enough.
+// Precondition: `bytes` points to at least as many bytes as the number has.
 #pragma once
 
 #include <bit>

@@ -1,6 +1,6 @@
-// Connects a simulated drive or sensor to its bus, an in-process bus (SimulatedCanNetwork) or, in a separate process, a
-// CAN interface of the kernel. The owner of the bus gives the device a CanPort for sending and calls on_frame() for
-// every frame of another node.
+// Connects a simulated drive or sensor to its bus. The bus is either in-process (SimulatedCanNetwork) or, if the device
+// runs in a separate process, a CAN interface of the kernel. The owner of the bus gives the device a CanPort for
+// sending and calls the device's on_frame() for every frame of another node.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class CanPort {
   CanPort& operator=(const CanPort&) = delete;
   virtual ~CanPort() = default;
 
-  // Queues the frame behind this node's earlier ones. Never blocks.
+  // Queues the frame behind the frames that this node sent earlier. Never blocks.
   virtual SendResult send(const CanFrame& frame) noexcept = 0;
 };
 
@@ -28,7 +28,8 @@ class CanListener {
   CanListener& operator=(const CanListener&) = delete;
   virtual ~CanListener() = default;
 
-  // Reports a frame of another node, complete on the wire at time_ns. May send and schedule events.
+  // Handles a frame of another node. The frame's last bit was on the wire at time_ns. The function may send frames and
+  // schedule events.
   virtual void on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept = 0;
 };
 

@@ -21,7 +21,7 @@ timespec to_timespec(std::int64_t ns) noexcept {
   return {static_cast<std::time_t>(ns / ns_per_s), static_cast<long>(ns % ns_per_s)};
 }
 
-// An RTM_GETLINK request by name, or for all links.
+// An RTM_GETLINK request for one interface by name, or for all interfaces.
 struct LinkRequest {
   nlmsghdr header{};
   ifinfomsg message{};
@@ -44,7 +44,7 @@ LinkRequest link_request(const std::string* name) {
   return request;
 }
 
-// Calls on_attribute(type, data, bytes) for each attribute in [attribute, attribute + bytes).
+// Calls on_attribute(type, data, bytes) for each attribute in the memory range [attribute, attribute + bytes).
 template <class F>
 void for_each_attribute(rtattr* attribute, long bytes, F&& on_attribute) {
   while (bytes >= static_cast<long>(sizeof(rtattr)) && attribute->rta_len >= sizeof(rtattr) &&
@@ -85,7 +85,8 @@ NamedInterface decode_link(nlmsghdr* header) {
   return out;
 }
 
-// Asks the kernel and calls on_link for each answer. False if netlink itself fails.
+// Asks the kernel for the interface `name`, or for all interfaces if `name` is nullptr. Calls on_link for each answer.
+// False if netlink itself fails.
 template <class F>
 bool query_links(const std::string* name, F&& on_link) {
   const int fd = ::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE);

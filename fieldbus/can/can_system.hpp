@@ -1,5 +1,6 @@
-// The system calls of SocketCanNetwork, one virtual function each. Tests override them to return ENOBUFS, EAFNOSUPPORT
-// or a lost interface. Semantics, results and errno are those of the calls.
+// The system calls of SocketCanNetwork, one virtual function for each call. Tests override the functions to simulate
+// ENOBUFS, EAFNOSUPPORT or a lost interface. Behaviour, return value and errno of each function are those of its system
+// call.
 #pragma once
 
 #include <poll.h>
@@ -14,7 +15,7 @@ namespace proxarm::fieldbus {
 
 class CanSystem {
  public:
-  // `kind` is the driver's link kind ("vcan", "can"), empty if it has none.
+  // `kind` is the driver's link kind ("vcan", "can"), or empty if the driver reports no kind.
   struct Interface {
     bool exists = false;
     unsigned index = 0;
@@ -28,11 +29,13 @@ class CanSystem {
   CanSystem(const CanSystem&) = delete;
   CanSystem& operator=(const CanSystem&) = delete;
   virtual ~CanSystem() = default;
-  // The real system calls; stateless.
+  // Returns the implementation that makes real system calls. It has no state.
   static CanSystem& real() noexcept;
 
-  [[nodiscard]] virtual Interface interface(const std::string& name);  // by rtnetlink; works without CAN in the kernel
-  [[nodiscard]] virtual std::string can_interfaces();                  // names, "vcan0, can1"; empty: none
+  // Asks for the interface by rtnetlink, which works even if the kernel has no CAN.
+  [[nodiscard]] virtual Interface interface(const std::string& name);
+  // Returns the names of all CAN interfaces, such as "vcan0, can1"; empty if there are none.
+  [[nodiscard]] virtual std::string can_interfaces();
 
   virtual int open_raw_can() noexcept;  // socket(PF_CAN, SOCK_RAW | nonblocking, CAN_RAW)
   virtual int bind_can(int fd, unsigned interface_index) noexcept;

@@ -5,8 +5,9 @@
 namespace proxarm::fieldbus {
 namespace {
 
-// Bit stuffing as a machine of eight states: the value of the last bit on the wire (bit 2), and the length of its run
-// of equal bits, less one (bits 0, 1). The step that adds a fifth equal bit also adds its stuff bit.
+// Bit stuffing as a machine of eight states. Bit 2 of the state is the value of the last bit on the wire. Bits 0 and 1
+// are the number of equal bits at the end of the wire, minus one. The transition that adds the fifth equal bit also
+// adds its stuff bit.
 struct StuffStep {
   int state;
   int stuff_bits;
@@ -15,10 +16,10 @@ constexpr StuffStep stuff_one_bit(int state, int bit) {
   const int value = state >> 2, run = (state & 3) + 1;
   if (bit != value) return {bit << 2, 0};
   if (run < 4) return {(bit << 2) | run, 0};
-  return {(1 - bit) << 2, 1};  // fifth equal bit; the stuff bit starts the next run
+  return {(1 - bit) << 2, 1};  // this was the fifth equal bit; its stuff bit begins the next run
 }
 
-// Entry: next state (bits 0..2), stuff bits in this byte (bits 3, 4).
+// Entry for [state][byte]: the next state in bits 0..2, the number of stuff bits in this byte in bits 3 and 4.
 using StuffTable = std::array<std::array<std::uint8_t, 256>, 8>;
 constexpr StuffTable make_stuff_table() {
   StuffTable table{};
@@ -37,7 +38,7 @@ constexpr StuffTable make_stuff_table() {
 }
 constexpr StuffTable stuff_table = make_stuff_table();
 
-// CRC-15 of classic CAN: x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1, start 0.
+// CRC-15 of classic CAN: x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1, initial value 0.
 constexpr std::array<std::uint16_t, 256> make_crc15_table() {
   std::array<std::uint16_t, 256> table{};
   for (unsigned byte = 0; byte < 256; ++byte) {
@@ -74,10 +75,11 @@ WireBits classic_bits(const CanFrame& frame) noexcept {
   const int bytes = frame.remote ? 0 : length;
   const std::uint64_t remote = frame.remote ? 1 : 0;
   const auto dlc = static_cast<std::uint64_t>(length);
-  // SOF (0) to DLC, right-aligned. Zeros before it don't change the CRC.
+  // The bits from SOF (0) to DLC, right-aligned. Zeros before the SOF don't change the CRC.
   std::uint64_t header = 0;
   int header_bytes = 3;
-  std::uint64_t padding = 0b10101ull << 19;  // fills whole bytes before the SOF; alternating, so it stuffs nothing
+  // Bits before the SOF that complete its byte. They alternate, so they cause no stuff bit.
+  std::uint64_t padding = 0b10101ull << 19;
   if (frame.extended) {
     const std::uint64_t base = (frame.id >> 18) & 0x7ff, extension = frame.id & 0x3ffff;
     header = (base << 27) | (3ull << 25) | (extension << 7) | (remote << 6) | dlc;
@@ -98,7 +100,7 @@ WireBits classic_bits(const CanFrame& frame) noexcept {
     crc = ((crc << 8) ^ crc15_table[((crc >> 7) ^ byte) & 0xff]) & 0x7fff;
     stuff.byte(byte);
   }
-  // The 15 CRC bits and one more that differs from the last, so that it can't complete a run of five.
+  // The 15 CRC bits and one padding bit. The padding bit differs from the last CRC bit, so it completes no run of five.
   const unsigned tail = (crc << 1) | (~crc & 1);
   stuff.byte(tail >> 8);
   stuff.byte(tail & 0xff);
@@ -108,12 +110,12 @@ WireBits classic_bits(const CanFrame& frame) noexcept {
 WireBits fd_bits(const CanFrame& frame) noexcept {
   const int bytes = padded_length(frame.length, true);
   const std::uint64_t switched = frame.bit_rate_switch ? 1 : 0;
-  // SOF (0) to BRS, right-aligned, after alternating padding.
+  // The bits from SOF (0) to BRS, right-aligned, after alternating padding bits.
   std::uint64_t header = 0;
   int header_bytes = 3;
   if (frame.extended) {
     const std::uint64_t base = (frame.id >> 18) & 0x7ff, extension = frame.id & 0x3ffff;
-    // ... SRR 1, IDE 1, extension, RRS 0, FDF 1, res 0, BRS
+    // After the base identifier: SRR 1, IDE 1, extension, RRS 0, FDF 1, res 0, BRS.
     header = (0b0101ull << 36) | (base << 24) | (3ull << 22) | (extension << 4) | (1ull << 2) | switched;
     header_bytes = 5;
   } else {
@@ -131,7 +133,7 @@ WireBits fd_bits(const CanFrame& frame) noexcept {
     for (int i = 0; i < bytes; ++i) stuff.byte(frame.data[static_cast<std::size_t>(i)]);
     last_bit = frame.data[static_cast<std::size_t>(bytes - 1)] & 1;
   }
-  // A stuff bit due after the last bit is the first fixed stuff bit, which the 27 or 32 already include.
+  // A stuff bit due after the last data bit is the first fixed stuff bit. The 27 or 32 bits below already include it.
   const int rest_stuff = stuff.count() - head_stuff - (stuff.last_bit_on_wire() != last_bit ? 1 : 0);
   const WireBits bits{(frame.extended ? 36 : 17) + head_stuff + 13,
                       5 + 8 * bytes + rest_stuff + (bytes <= 16 ? 27 : 32)};

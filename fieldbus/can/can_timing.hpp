@@ -1,18 +1,23 @@
-// How long a CAN frame occupies its bus: the exact time from its bits, and published bounds for planning.
+// Computes how long a CAN frame occupies its bus: the exact time from the frame's bits, and published bounds for
+// planning.
 //
-// Classic frame, n data bytes (ISO 11898-1; one column per bit count):
+// Classic frame with n data bytes (ISO 11898-1; each number is a count of bits):
 //   11-bit: SOF 1, id 11, RTR 1, IDE 1, r0 1, DLC 4, data 8n, CRC 15                                       = 34 + 8n
 //   29-bit: SOF 1, id 11, SRR 1, IDE 1, id 18, RTR 1, r1 1, r0 1, DLC 4, data 8n, CRC 15                   = 54 + 8n
-//     these are stuffed: after five equal bits, stuff bits counted, follows one of the other value
-//   CRC delimiter 1, ACK 1, ACK delimiter 1, EOF 7, interframe space 3                                      = 13
+//     these bits are stuffed: five equal bits in a row, stuff bits included, are followed by one bit of the opposite
+//     value
+//   not stuffed: CRC delimiter 1, ACK 1, ACK delimiter 1, EOF 7, interframe space 3                         = 13
 // CAN FD:
 //   11-bit: SOF 1, id 11, RRS 1, IDE 1, FDF 1, res 1, BRS 1                                                = 17
 //   29-bit: SOF 1, id 11, SRR 1, IDE 1, id 18, RRS 1, FDF 1, res 1, BRS 1                                  = 36
-//   ESI 1, DLC 4, data 8n (stuffed as above up to here)
-//   stuff count 4, CRC 17 (n ≤ 16) or 21, with a fixed stuff bit before the stuff count and after each four of these
-//   bits: 27 or 32 in all; then the same 13 bits as above
-//   A dynamic stuff bit due after the last data bit coincides with the first fixed one. ESI is assumed 0 (sender error
-//   active). With BRS, all but the first line and the last 13 bits are sent at the data bitrate.
+//   ESI 1, DLC 4, data 8n                                                                                  = 5 + 8n
+//   Dynamic stuff bits, as in a classic frame, are inserted from SOF to the last data bit.
+//   The stuff count (4 bits) and the CRC (17 bits if n ≤ 16, else 21) follow. They have fixed stuff bits: one before
+//   the stuff count and one after each four bits of stuff count and CRC. Together they are 27 or 32 bits.
+//   The same 13 bits as in a classic frame end the frame.
+//   A dynamic stuff bit that is due after the last data bit coincides with the first fixed stuff bit. ESI is assumed to
+//   be 0 (the sender is error active). With BRS, ESI to CRC are sent at the data bitrate, all other bits at the nominal
+//   bitrate.
 #pragma once
 
 #include <cstdint>
@@ -24,23 +29,24 @@ namespace proxarm::fieldbus {
 inline constexpr int can_interframe_bits = 3;
 
 struct BitRates {
-  std::int64_t nominal = 1'000'000;  // bit/s, > 0; arbitration phase
-  std::int64_t data = 0;             // bit/s of the CAN FD data phase; 0: all at the nominal rate
+  std::int64_t nominal = 1'000'000;  // bit/s of the arbitration phase, > 0
+  std::int64_t data = 0;  // bit/s of the CAN FD data phase; 0: the nominal bitrate also holds for the data phase
 };
 
-// Bits on the wire, interframe space included, by bitrate.
+// Number of bits on the wire at each bitrate, interframe space included.
 struct WireBits {
   int nominal = 0;
-  int data = 0;  // 0 unless FD with bit rate switch
+  int data = 0;  // 0 except in a CAN FD frame with bit rate switch
 
   [[nodiscard]] constexpr int total() const noexcept { return nominal + data; }
   friend constexpr bool operator==(const WireBits&, const WireBits&) = default;
 };
 
-// Exact bits of this frame. Invalid lengths are rounded up to the next valid one. No allocation; any thread.
+// Returns the exact bits of this frame. An invalid length counts as padded_length() says. Allocates nothing; may be
+// called from any thread.
 [[nodiscard]] WireBits wire_bits(const CanFrame& frame) noexcept;
 
-// Duration in ns, rounded to the nearest.
+// Returns the duration in ns. The time at each bitrate is rounded to the nearest ns.
 [[nodiscard]] constexpr std::int64_t wire_time_ns(WireBits bits, const BitRates& rates) noexcept {
   const std::int64_t data_rate = rates.data > 0 ? rates.data : rates.nominal;
   const std::int64_t nominal_ns = (bits.nominal * std::int64_t{1'000'000'000} + rates.nominal / 2) / rates.nominal;
@@ -51,7 +57,7 @@ struct WireBits {
   return wire_time_ns(wire_bits(frame), rates);
 }
 
-// Properties of a frame that are known in planning.
+// The properties of a frame that planning knows before the data bytes.
 struct FrameShape {
   int bytes = 0;
   bool extended = false;
@@ -60,7 +66,8 @@ struct FrameShape {
   friend constexpr bool operator==(const FrameShape&, const FrameShape&) = default;
 };
 
-// Next length with a DLC: up to 8 itself (classic: at most 8), then 12, 16, 20, 24, 32, 48, 64.
+// Returns the smallest valid frame length of at least `bytes`: 0..8, and for CAN FD also 12, 16, 20, 24, 32, 48, 64.
+// Larger values give the maximum of 8 or 64.
 [[nodiscard]] constexpr int padded_length(int bytes, bool fd) noexcept {
   if (bytes <= 0) return 0;
   if (bytes <= 8) return bytes;
@@ -70,11 +77,11 @@ struct FrameShape {
   }
   return 64;
 }
-// True if a frame of this kind can carry this many bytes.
+// True if a classic frame (or a CAN FD frame if `fd`) can have exactly this many data bytes.
 [[nodiscard]] constexpr bool is_valid_length(int bytes, bool fd) noexcept {
   return bytes >= 0 && padded_length(bytes, fd) == bytes;
 }
-// The DLC of a padded length.
+// Returns the DLC of a valid length.
 [[nodiscard]] constexpr int data_length_code(int bytes) noexcept {
   if (bytes <= 8) return bytes;
   return bytes <= 24 ? 9 + (bytes - 12) / 4 : bytes == 32 ? 13 : bytes == 48 ? 14 : 15;
@@ -83,7 +90,8 @@ struct FrameShape {
 namespace can_timing_detail {
 constexpr WireBits bits_with_stuffing(const FrameShape& shape, bool worst) noexcept {
   const int n = padded_length(shape.bytes, shape.fd);
-  // A stuff bit after the first five bits, then, as it counts itself, after every four.
+  // The first stuff bit comes after five bits. Each stuff bit counts as the first of the next five, so every further
+  // four bits add one.
   const auto stuffing = [worst](int bits) { return worst ? (bits - 1) / 4 : 0; };
   if (!shape.fd) {
     const int stuffed = (shape.extended ? 54 : 34) + 8 * n;
@@ -96,11 +104,12 @@ constexpr WireBits bits_with_stuffing(const FrameShape& shape, bool worst) noexc
 }
 }  // namespace can_timing_detail
 
-// Without a single (dynamic) stuff bit: 47 + 8n classic.
+// Returns the bits of a frame without dynamic stuff bits: 47 + 8n in a classic 11-bit frame.
 [[nodiscard]] constexpr WireBits minimum_wire_bits(const FrameShape& shape) noexcept {
   return can_timing_detail::bits_with_stuffing(shape, false);
 }
-// The published upper bound: classic 55 + 10n (11 bits), 80 + 10n (29 bits). No frame is longer.
+// Returns the published upper bound: 55 + 10n in a classic 11-bit frame, 80 + 10n in a classic 29-bit frame. No frame
+// has more bits.
 [[nodiscard]] constexpr WireBits worst_wire_bits(const FrameShape& shape) noexcept {
   return can_timing_detail::bits_with_stuffing(shape, true);
 }

@@ -17,9 +17,9 @@ using description::in_quotes;
 using description::SetupError;
 
 constexpr std::string_view digits = "0123456789ABCDEF";
-constexpr std::uint32_t error_flag = 0x20000000;  // in the identifier of an error frame, as in SocketCAN
+constexpr std::uint32_t error_flag = 0x20000000;  // set in the identifier of an error frame, as in SocketCAN
 constexpr unsigned switch_flag = 1;               // CANFD_BRS
-constexpr std::size_t longest_line = 4096;        // a longer line is rejected unread
+constexpr std::size_t longest_line = 4096;        // a longer line is rejected without parsing
 
 class Output {
  public:
@@ -84,7 +84,7 @@ struct Mistake {
   const char* expected;
 };
 
-// "(1436509052.249713)" to ns.
+// Converts a time such as "(1436509052.249713)" to ns.
 std::optional<Mistake> parse_time(std::string_view word, std::int64_t& out) noexcept {
   const Mistake mistake{word, "a time such as (1436509052.249713)"};
   if (word.size() < 3 || word.front() != '(' || word.back() != ')') return mistake;
@@ -137,7 +137,7 @@ std::optional<Mistake> parse_data(std::string_view text, CanFrame& out) noexcept
     out.data[bytes++] = static_cast<std::uint8_t>(high << 4 | low);
     rest.remove_prefix(2);
   }
-  if (!rest.empty()) {  // a DLC above 8 still means eight bytes
+  if (!rest.empty()) {  // the raw DLC: values of 9 to 15 also mean eight bytes
     if (out.fd || bytes != 8 || rest.size() != 2 || hex_value(rest[1]) < 9) {
       return Mistake{text, "_9 to _F after eight bytes only"};
     }

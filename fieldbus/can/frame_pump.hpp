@@ -1,4 +1,4 @@
-// Receives on all buses of a network until a condition holds or a deadline passes; not for the cycle.
+// Receives on all buses of a network until a condition holds or a deadline passes. Not for use in the cycle.
 #pragma once
 
 #include <cstddef>
@@ -9,11 +9,13 @@
 
 namespace proxarm::fieldbus {
 
-// Gets every frame of every bus, per bus in the order received. No frame is lost while another is awaited.
+// Gets every frame of every bus; the frames of one bus come in the order of their reception. A handler that waits for
+// one frame also gets all other frames, so none is lost.
 using FrameHandler = std::function<void(std::size_t bus, const TimedFrame& frame)>;
 
-// Calls `on_frame` for each received frame and `work(now_ns)` after each batch. `work` returns the latest time of its
-// next call (absolute), or `pump_done` to end. Returns true if `work` ended the loop, false at the deadline.
+// Calls `on_frame` for each received frame and `work(now_ns)` after each batch of frames. `work` returns the absolute
+// time of its next call at the latest, or `pump_done` to end the loop. Returns true if `work` ended the loop, false at
+// the deadline.
 inline constexpr std::int64_t pump_done = -1;
 bool pump_frames(CanNetwork& network, std::int64_t deadline_ns, const FrameHandler& on_frame,
                  const std::function<std::int64_t(std::int64_t now_ns)>& work);

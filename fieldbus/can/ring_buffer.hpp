@@ -11,7 +11,7 @@ class RingBuffer {
  public:
   explicit RingBuffer(std::size_t capacity) : items_(capacity) {}
 
-  // False if full; then nothing is stored.
+  // Appends the item. False if the buffer is full; the item is then not stored.
   bool push(const T& item) noexcept {
     if (size_ == items_.size()) return false;
     std::size_t index = head_ + size_;
@@ -20,7 +20,7 @@ class RingBuffer {
     ++size_;
     return true;
   }
-  // Oldest element. Precondition: not empty.
+  // Returns the oldest item. Precondition: the buffer isn't empty.
   [[nodiscard]] const T& front() const noexcept { return items_[head_]; }
   void pop() noexcept {
     if (++head_ == items_.size()) head_ = 0;

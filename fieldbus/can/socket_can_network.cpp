@@ -19,7 +19,8 @@ namespace {
 
 using description::SetupError;
 
-// CLOCK_REALTIME is slewed by at most 500 ppm, which is 5 µs in this time.
+// How long a measured difference between the clocks is used. CLOCK_REALTIME is slewed by at most 500 ppm, which is 5 µs
+// in 10 ms.
 constexpr std::int64_t difference_kept_ns = 10'000'000;
 constexpr std::size_t batch_size = 32;  // frames per recvmmsg or sendmmsg
 
@@ -75,7 +76,7 @@ SendResult send_result(int error) noexcept {
   }
 }
 
-// Returns the number of bytes of `out` to be passed to the kernel.
+// Encodes the frame for the kernel. Returns how many bytes of `out` are to be passed to the kernel.
 std::size_t encode(const CanFrame& frame, canfd_frame& out) noexcept {
   out.can_id = frame.id | (frame.extended ? CAN_EFF_FLAG : 0u) | (frame.remote ? CAN_RTR_FLAG : 0u);
   out.len = frame.length;
@@ -103,21 +104,22 @@ CanFrame decode(const canfd_frame& raw, bool fd) noexcept {
 
 }  // namespace
 
-// Converts the kernel's stamps to CLOCK_MONOTONIC. Without vDSO, reading a clock is a system call. So all buses share
-// one reading, and the difference of the clocks is kept for a while.
+// Converts the kernel's time stamps to CLOCK_MONOTONIC. Without vDSO, each reading of a clock is a system call. To save
+// calls, all buses share one reading of CLOCK_MONOTONIC, and a measured difference between the clocks is used for 10
+// ms.
 class SocketCanNetwork::Clocks {
  public:
   explicit Clocks(CanSystem& system) : system_(system) {}
 
-  // Call right after receiving a batch.
+  // Precondition: the caller has just received a batch.
   void read() noexcept {
     now_ns_ = system_.clock_ns(CLOCK_MONOTONIC);
     if (now_ns_ < read_again_ns_) return;
     offset_ns_ = now_ns_ - system_.clock_ns(CLOCK_REALTIME);
     read_again_ns_ = now_ns_ + difference_kept_ns;
   }
-  [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }  // at the last reading
-  // stamp_ns = 0: no stamp.
+  [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }  // time of the last call of read()
+  // `stamp_ns` is 0 for a frame without a time stamp; the time of the last read() is then returned.
   [[nodiscard]] std::int64_t monotonic_ns(std::int64_t stamp_ns) const noexcept {
     return stamp_ns > 0 ? std::min(stamp_ns + offset_ns_, now_ns_) : now_ns_;
   }
@@ -146,10 +148,10 @@ class SocketCanNetwork::Bus final : public CanBus {
   [[nodiscard]] int fd() const noexcept { return fd_; }
   [[nodiscard]] bool fd_capable() const noexcept { return fd_capable_; }
   [[nodiscard]] bool has_frame() const noexcept { return next_ < count_; }
-  // The kernel has just reported that nothing is waiting.
+  // Notes that the socket is empty. Precondition: the kernel has just reported that no frame is waiting.
   void known_empty() noexcept { drained_ = !has_frame(); }
-  // Reads a batch if none is left. The frames' times are the kernel's until date() is called. False if nothing but
-  // error frames was waiting.
+  // Reads a batch from the socket. Precondition: no decoded frame is left. The frames keep the kernel's time stamps
+  // until date() is called. False if no frames, or only error frames, were waiting.
   bool fill() noexcept;
   void date() noexcept;
 
@@ -175,14 +177,15 @@ class SocketCanNetwork::Bus final : public CanBus {
   std::array<mmsghdr, batch_size> out_headers_{};
   std::array<iovec, batch_size> out_vectors_{};
   std::array<canfd_frame, batch_size> out_frames_{};
-  std::array<std::size_t, batch_size> out_places_{};  // index in the caller's list
+  std::array<std::size_t, batch_size> out_places_{};  // position of each frame in the caller's list
   std::array<mmsghdr, batch_size> headers_{};
   std::array<iovec, batch_size> vectors_{};
   std::array<Message, batch_size> messages_{};
-  std::array<TimedFrame, batch_size> frames_{};  // decoded; those in [next_, count_) aren't handed out yet
+  // Decoded frames; frames in [next_, count_) are still to be returned by receive().
+  std::array<TimedFrame, batch_size> frames_{};
   std::size_t next_ = 0;
   std::size_t count_ = 0;
-  bool drained_ = false;  // the last batch emptied the socket, so the next receive() needn't ask
+  bool drained_ = false;  // the last batch emptied the socket, so the next receive() makes no system call
   std::uint32_t dropped_ = 0;
   std::int64_t last_time_ns_ = 0;
 };
@@ -250,8 +253,9 @@ void SocketCanNetwork::Bus::send_all(std::span<const CanFrame> frames, std::int6
   }
 }
 
-// sendmmsg() stops at the first frame that the kernel refuses, and gives the reason only if it was the call's first
-// frame. So the remaining frames go with another call.
+// Passes the encoded frames to the kernel. sendmmsg() stops at the first frame that the kernel refuses. It gives the
+// reason only if that frame was the first of the call. So the refused frame and the frames after it are passed in
+// another call.
 void SocketCanNetwork::Bus::hand_over(std::size_t count, SendResult* results) noexcept {
   std::size_t done = 0;
   while (done < count) {
@@ -279,7 +283,7 @@ bool SocketCanNetwork::Bus::receive(TimedFrame& out) noexcept {
   return true;
 }
 
-// The kernel has overwritten the lengths.
+// Resets message i for recvmmsg(), because the kernel has overwritten its lengths.
 void SocketCanNetwork::Bus::prepare(std::size_t i) noexcept {
   vectors_[i] = {&messages_[i].frame, sizeof(canfd_frame)};
   headers_[i].msg_hdr = {};
@@ -317,7 +321,7 @@ void SocketCanNetwork::Bus::date() noexcept {
   }
 }
 
-// Returns the time stamp (CLOCK_REALTIME), 0 if there is none.
+// Reads the control data of message i. Returns the time stamp (CLOCK_REALTIME), or 0 if the message has no stamp.
 std::int64_t SocketCanNetwork::Bus::read_control(std::size_t i) noexcept {
   std::int64_t stamp_ns = 0;
   msghdr& header = headers_[i].msg_hdr;
@@ -330,7 +334,8 @@ std::int64_t SocketCanNetwork::Bus::read_control(std::size_t i) noexcept {
     } else if (control->cmsg_type == SO_RXQ_OVFL) {
       std::uint32_t dropped = 0;
       std::memcpy(&dropped, CMSG_DATA(control), sizeof dropped);
-      status_.receive_overflows += dropped - dropped_;  // the kernel's 32-bit counter may wrap
+      // Unsigned difference, because the kernel's 32-bit counter may wrap.
+      status_.receive_overflows += dropped - dropped_;
       dropped_ = dropped;
     }
   }
@@ -354,7 +359,8 @@ SocketCanNetwork::SocketCanNetwork(const std::vector<std::string>& interfaces, c
                                    CanSystem& system)
     : system_(system), clocks_(std::make_unique<Clocks>(system)) {
   if (interfaces.empty()) throw SetupError({.key = "--bus", .message = "no CAN interface named"});
-  // The kernel first: without CAN in it no interface can exist, and the user must know that.
+  // Check the kernel before the interfaces: without CAN in the kernel no interface can exist, and the message must say
+  // so.
   const int probe = system_.open_raw_can();
   if (probe < 0) refuse_kernel(interfaces.front(), errno);
   system_.close(probe);
@@ -415,10 +421,10 @@ bool SocketCanNetwork::wait_for_frame(std::int64_t deadline_ns) noexcept {
         }
         return true;
       }
-      // Error frames only, or an interface that went down (reported once): keep waiting.
+      // Only error frames were waiting, or an interface went down (poll() reports that once): keep waiting.
     }
     if (rest_ns > 0 && ready != 0) continue;
-    // poll() never returns early, so the deadline has passed.
+    // poll() never returns before its timeout, so the deadline has passed.
     if (ready == 0) {
       waited_ns_ += std::max<std::int64_t>(rest_ns, 0);
       for (const auto& bus : buses_) bus->known_empty();

@@ -4,18 +4,18 @@
 //   network.bus_of(1) == 0, network.bus_of(2) == 1
 //   network.set_filters(0, {{.id = 0x180, .mask = 0x780}, {.id = 0x080, .mask = 0x7ff}});
 //
-// One non-blocking socket per bus. Frames are sent and received in batches (sendmmsg, recvmmsg). The kernel drops
-// frames that no filter accepts, and counts those that its buffer had no room for (SO_RXQ_OVFL). receive() never
-// returns error frames; they set status().state.
+// Each bus has one non-blocking socket. Frames are sent and received in batches (sendmmsg, recvmmsg). The kernel drops
+// frames that no filter accepts. It also drops frames for which its buffer has no room, and counts those (SO_RXQ_OVFL).
+// receive() never returns error frames; error frames change status().state.
 //
-// A time stamp is the kernel's at reception (SO_TIMESTAMPNS, CLOCK_REALTIME), converted to CLOCK_MONOTONIC by the
-// difference of both clocks, which is read again every 10 ms. That is exact to 5 µs, even while CLOCK_REALTIME is
-// slewed at its maximum rate, unless that clock was set in between. A stamp is never later than now and never earlier
-// than the previous frame's.
+// A frame's time stamp is set by the kernel at reception (SO_TIMESTAMPNS, CLOCK_REALTIME). It is converted to
+// CLOCK_MONOTONIC by the difference between the two clocks, which is measured again every 10 ms. The converted stamp is
+// exact to 5 µs, even while CLOCK_REALTIME is slewed at its maximum rate, unless CLOCK_REALTIME was set since the last
+// measurement. A stamp is never later than now and never earlier than the stamp of the previous frame.
 //
-// After bus-off the kernel has purged its queue, and send() refuses until the interface reports its restart; the
-// supervisor then decides what is sent. A removed interface stays `down`; one that was set down works again once it is
-// up.
+// At bus-off the kernel purges its send queue. After bus-off, send() returns SendResult::bus_off until the interface
+// reports its restart. The supervisor then decides which frames are sent. The state of a removed interface stays
+// `down`. An interface that was set down works again once it is up.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +29,7 @@
 
 namespace proxarm::fieldbus {
 
-// Frames with (id & mask) == (filter.id & mask) and this identifier length. Remote frames pass as well.
+// Accepts frames with (id & mask) == (filter.id & mask) and the same identifier length, remote frames included.
 struct CanFilter {
   std::uint32_t id = 0;
   std::uint32_t mask = 0x1fffffff;
@@ -37,23 +37,25 @@ struct CanFilter {
 };
 
 struct SocketCanOptions {
-  int receive_buffer_bytes =
-      4 << 20;          // the default of 208 kB holds 278 frames; limited by net.core.rmem_max unless root
-  bool closed = false;  // nothing passes until set_filters(), so earlier frames can't fill the buffer
+  // Size of the kernel's receive buffer. The kernel's default of 208 kB holds only 278 frames. Without root rights,
+  // net.core.rmem_max limits the size.
+  int receive_buffer_bytes = 4 << 20;
+  bool closed = false;  // no frame passes until set_filters() is called, so earlier frames can't fill the buffer
 };
 
 class SocketCanNetwork final : public CanNetwork {
  public:
-  // Opens all interfaces. Throws SetupError with a message that says what to do if the kernel has no CAN, or if an
-  // interface doesn't exist, is no CAN interface or is down. `system` must outlive the network.
+  // Opens all interfaces. Throws SetupError if the kernel has no CAN, or if an interface doesn't exist, is no CAN
+  // interface or is down. The message says what to do. `system` must outlive the network.
   explicit SocketCanNetwork(const std::vector<std::string>& interfaces, const SocketCanOptions& options = {},
                             CanSystem& system = CanSystem::real());
   ~SocketCanNetwork() override;
 
-  // Index of the bus for the i-th name of the list.
+  // Returns the index of the bus to which the i-th name of the list belongs.
   [[nodiscard]] std::size_t bus_of(std::size_t listed) const noexcept { return bus_of_[listed]; }
-  // From now on only frames that match one of these filters pass; none if the list is empty. Frames already received
-  // stay. At first everything passes, unless SocketCanOptions::closed is set. At most 512 filters. Throws SetupError.
+  // Lets only frames pass that match at least one of these filters; an empty list lets no frame pass. Frames that were
+  // received before the call stay in the queue. Until the first call every frame passes, or no frame if
+  // SocketCanOptions::closed is set. Throws SetupError if the kernel refuses the filters, as it does for more than 512.
   void set_filters(std::size_t bus, const std::vector<CanFilter>& filters);
   [[nodiscard]] bool carries_fd(std::size_t bus) const noexcept;
 
@@ -73,13 +75,13 @@ class SocketCanNetwork final : public CanNetwork {
   std::vector<std::unique_ptr<Bus>> buses_;
   std::vector<std::size_t> bus_of_;
   std::vector<pollfd> poll_;
-  std::vector<bool> filled_;  // by the last wait
+  std::vector<bool> filled_;  // per bus: whether the last wait read frames from it
   std::int64_t waited_ns_ = 0;
 };
 
-// True only for interfaces of kind vcan or vxcan by rtnetlink (IFLA_INFO_KIND), whatever their name. sysfs also calls
-// slcan virtual, which is a real bus on a serial line. False if the interface doesn't exist. Doesn't detect a gateway
-// (cangw) that forwards a virtual bus to a real one.
+// True if rtnetlink (IFLA_INFO_KIND) reports the interface's kind as vcan or vxcan. The interface's name doesn't
+// matter. sysfs isn't used because it calls slcan virtual too, and slcan is a real bus on a serial line. False if the
+// interface doesn't exist. A gateway (cangw) that forwards a virtual bus to a real bus isn't detected.
 [[nodiscard]] bool is_virtual_can(const std::string& interface, CanSystem& system = CanSystem::real());
 
 }  // namespace proxarm::fieldbus

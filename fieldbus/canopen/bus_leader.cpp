@@ -74,7 +74,7 @@ std::string LeaderWatch::signs() const {
 
 namespace {
 
-// Listens for all of time_ns, with one watch per bus.
+// Listens on all buses until time_ns has passed. Returns one watch per bus.
 std::vector<LeaderWatch> listen(CanNetwork& network, std::span<const BusToLead> buses, Listening listening,
                                 std::int64_t time_ns, const FrameHandler& other) {
   std::vector<LeaderWatch> watches;
@@ -90,7 +90,7 @@ std::vector<LeaderWatch> listen(CanNetwork& network, std::span<const BusToLead> 
   return watches;
 }
 
-// Throws `problem` for the first bus on which signs were seen.
+// Throws `problem` for the first bus whose watch has seen signs.
 void refuse_if_seen(CanNetwork& network, std::span<const BusToLead> buses, const std::vector<LeaderWatch>& watches,
                     description::SetupProblem problem) {
   for (std::size_t i = 0; i < buses.size(); ++i) {

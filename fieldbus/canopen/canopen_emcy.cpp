@@ -8,11 +8,11 @@ namespace {
 
 struct Wording {
   std::uint16_t code;
-  std::uint16_t mask;  // FFFF: exact code; FF00 and F000: class
+  std::uint16_t mask;  // FFFF: the row holds for one code; FF00 or F000: for a class of codes
   std::string_view text;
 };
 
-// Exact codes before classes: the first match is taken.
+// Rows of exact codes stand before rows of classes, because the first row that matches is taken.
 constexpr Wording wordings[] = {
     {0x0000, 0xFFFF, "error reset or no error"},
     // CiA 402, drives

@@ -4,7 +4,8 @@ namespace proxarm::fieldbus {
 
 bool HeartbeatProducer::due(std::int64_t now_ns, std::uint64_t cycle, CanFrame& frame) noexcept {
   if (ever_ && (now_ns < next_ns_ || cycle == last_cycle_)) return false;
-  // Keeps the schedule if possible; after a gap longer than a period, starts again from now.
+  // The next heartbeat is due one period after the last one was due. After a gap of more than a period, it is due one
+  // period after now.
   next_ns_ = ever_ && now_ns - next_ns_ < period_ns_ ? next_ns_ + period_ns_ : now_ns + period_ns_;
   last_cycle_ = cycle;
   ever_ = true;

@@ -1,8 +1,9 @@
-// Heartbeat (CiA 301, 7.2.8.3.2.2): master and drives notice when the other stops.
+// Heartbeat (CiA 301, 7.2.8.3.2.2): the master notices when a drive stops sending, and each drive when the master does.
 //
-// Wire: identifier 700 + node, one byte: the NMT state; 0 is the boot-up message, sent once after a reset.
-// HeartbeatProducer sends the master's heartbeat, without which drives stop by themselves (1016h). One
-// HeartbeatConsumer per drive watches the drive's heartbeat (1017h).
+// Wire: identifier 700 + node, one byte: the NMT state. State 0 is the boot-up message, which a node sends once after a
+// reset.
+// HeartbeatProducer sends the master's heartbeat; drives stop by themselves without it (1016h). One HeartbeatConsumer
+// per drive watches the drive's heartbeat (1017h).
 #pragma once
 
 #include <cstdint>
@@ -15,13 +16,13 @@ namespace proxarm::fieldbus {
 
 inline constexpr std::uint32_t heartbeat_id(std::uint8_t node) noexcept { return 0x700U + node; }
 
-// Sends a heartbeat only if the cycle's counter has moved. It is called from the cycle: a heartbeat from another thread
-// would go on after the cycle has stopped.
+// Produces the master's heartbeat. It must be called from the cycle, and a heartbeat is only due if the cycle counter
+// has moved. A heartbeat from another thread would continue after the cycle has stopped, and the drives wouldn't stop.
 class HeartbeatProducer {
  public:
   HeartbeatProducer(std::uint8_t node, std::int64_t period_ns) noexcept : node_(node), period_ns_(period_ns) {}
 
-  // True if a heartbeat is due and was written to `frame`. `cycle` counts completed cycles.
+  // True if a heartbeat is due; it is then written to `frame`. `cycle` is the number of completed cycles.
   [[nodiscard]] bool due(std::int64_t now_ns, std::uint64_t cycle, CanFrame& frame) noexcept;
   void archive(StateArchive& state) noexcept { state(next_ns_, last_cycle_, ever_); }
 
@@ -35,15 +36,16 @@ class HeartbeatProducer {
 
 class HeartbeatConsumer {
  public:
-  // `timeout_ns` 0: follows the state, but never reports a loss.
+  // If `timeout_ns` is 0, the consumer records the node's state, but never reports a loss.
   HeartbeatConsumer(std::uint8_t node, std::int64_t timeout_ns) noexcept : node_(node), timeout_ns_(timeout_ns) {}
 
-  // True if the frame was this node's heartbeat or boot-up message.
+  // Takes over the state from the frame. True if the frame was this node's heartbeat or boot-up message.
   bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept;
   [[nodiscard]] NmtState state() const noexcept { return state_; }
   [[nodiscard]] std::uint64_t boot_ups() const noexcept { return boot_ups_; }
   [[nodiscard]] bool heard() const noexcept { return heard_; }
-  // Watching starts with the first heartbeat, as in the standard, or with restart().
+  // True if the last heartbeat is older than the timeout. Never true before the first heartbeat (as in the standard) or
+  // a call of restart().
   [[nodiscard]] bool lost(std::int64_t now_ns) const noexcept {
     return timeout_ns_ > 0 && heard_ && now_ns - last_ns_ > timeout_ns_;
   }

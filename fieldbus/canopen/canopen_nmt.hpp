@@ -1,6 +1,7 @@
-// NMT (CiA 301, 7.2.8.3.1): the master's commands that move nodes between pre-operational, operational and stopped.
+// NMT (CiA 301, 7.2.8.3.1): the commands by which the master changes a node's state to pre-operational, operational or
+// stopped.
 //
-// Wire: identifier 000, two bytes: command, node (0: all nodes of the bus).
+// Wire: identifier 000, two bytes: the command and the node number (0: all nodes of the bus).
 #pragma once
 
 #include <cstdint>
@@ -13,25 +14,26 @@ namespace proxarm::fieldbus {
 inline constexpr std::uint8_t all_nodes = 0;
 
 enum class NmtCommand : std::uint8_t {
-  start = 0x01,                  // → operational: PDOs run
-  stop = 0x02,                   // → stopped: only NMT and heartbeat
-  enter_pre_operational = 0x80,  // → pre-operational: SDO, no PDO
-  reset_node = 0x81,             // whole device, as after power-on
-  reset_communication = 0x82,    // communication profile area only
+  start = 0x01,                  // → operational: PDOs are sent and received
+  stop = 0x02,                   // → stopped: only NMT commands and heartbeats work
+  enter_pre_operational = 0x80,  // → pre-operational: SDOs work, PDOs don't
+  reset_node = 0x81,             // resets the whole device, as switching it on does
+  reset_communication = 0x82,    // resets only the objects of the communication profile
 };
 
-// NMT states in heartbeat and boot-up messages (7.2.8.3.2).
+// NMT states as heartbeats and boot-up messages encode them (7.2.8.3.2).
 enum class NmtState : std::uint8_t {
   boot_up = 0x00,
   stopped = 0x04,
   operational = 0x05,
   pre_operational = 0x7F,
-  unknown = 0xFF,  // nothing received yet, or a value that the standard doesn't define
+  unknown = 0xFF,  // no heartbeat was received yet, or its value isn't defined in the standard
 };
 
-// `node` 0..127.
+// Precondition: `node` is 0..127.
 [[nodiscard]] CanFrame nmt_frame(NmtCommand command, std::uint8_t node) noexcept;
-[[nodiscard]] NmtState nmt_state_from_byte(std::uint8_t byte) noexcept;  // bit 7 (node guarding's toggle) is ignored
+// Ignores bit 7, which is the toggle bit of node guarding.
+[[nodiscard]] NmtState nmt_state_from_byte(std::uint8_t byte) noexcept;
 [[nodiscard]] std::string_view to_string(NmtState state) noexcept;
 
 }  // namespace proxarm::fieldbus

@@ -12,7 +12,7 @@ struct ObjectAddress {
   friend bool operator==(const ObjectAddress&, const ObjectAddress&) = default;
 };
 
-[[nodiscard]] std::string to_string(ObjectAddress object);            // "60C2h:01"
-[[nodiscard]] std::string hex_text(std::uint64_t value, int digits);  // "0x00020192"
+[[nodiscard]] std::string to_string(ObjectAddress object);            // such as "60C2h:01"
+[[nodiscard]] std::string hex_text(std::uint64_t value, int digits);  // such as "0x00020192"
 
 }  // namespace proxarm::fieldbus

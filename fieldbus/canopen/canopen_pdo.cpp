@@ -16,7 +16,8 @@ std::uint16_t mapping_index(PdoDirection direction, std::uint8_t number) noexcep
   return static_cast<std::uint16_t>((direction == PdoDirection::receive ? 0x1600 : 0x1A00) + number - 1);
 }
 
-// Bit 30 isn't compared when read back: some drives hold it at 1, some at 0.
+// Returns the step that writes the PDO's COB-ID. Bit 30 isn't compared when the COB-ID is read back: some drives always
+// report it as 1, others as 0.
 SdoStep cob_id_step(PdoDirection direction, std::uint8_t number, std::uint32_t cob_id, const char* name) {
   if (direction == PdoDirection::transmit) cob_id |= no_remote_request;
   SdoStep step = sdo_write({communication_index(direction, number), 1}, 4, cob_id, name);
@@ -51,9 +52,10 @@ std::uint32_t mapping_entry(const MappedObject& mapped) noexcept {
          mapped.bits;
 }
 
-// A fixed mapping of the drive is accepted if it is the wanted one. A transmit PDO may carry further objects at its
-// end. A receive PDO of type 0 (synchronous, acyclic) acts at the same SYNC; one of type 254 or 255 (asynchronous) acts
-// on reception.
+// If the drive's mapping is fixed, it is accepted if it equals the wanted mapping; a transmit PDO may carry further
+// objects after the wanted ones. If the transmission type of a receive PDO is fixed, these types are accepted too: 0
+// (synchronous, acyclic), which acts at the same SYNC as type 1, and 254 and 255 (asynchronous), which act on
+// reception.
 std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo) {
   check(pdo);
   const bool receive = pdo.direction == PdoDirection::receive;
@@ -99,8 +101,8 @@ SdoStep disable_pdo_step(PdoDirection direction, std::uint8_t number, std::uint8
   SdoStep step =
       if_present(cob_id_step(direction, number, does_not_exist | pdo_id(direction, number, node),
                              direction == PdoDirection::receive ? "unused RPDO COB-ID" : "unused TPDO COB-ID"));
-  step.mask = does_not_exist;  // an unused PDO may keep any identifier
-  // A receive PDO that can't be disabled is harmless: only the controller could send it.
+  step.mask = does_not_exist;  // only bit 31 is compared: an unused PDO may keep any identifier
+  // A receive PDO that can't be disabled is harmless, because only the controller could send it, and doesn't.
   if (direction == PdoDirection::transmit) step.as_found = {step.value};
   return step;
 }

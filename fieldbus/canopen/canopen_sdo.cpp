@@ -7,7 +7,9 @@
 namespace proxarm::fieldbus {
 namespace {
 
-constexpr std::int64_t retry_ns = 200'000;  // about two frames at 1 Mbit/s, after which a full queue has space again
+// Pause before a frame is sent again that a full queue refused. It lasts about two frames at 1 Mbit/s, so the queue has
+// space again.
+constexpr std::int64_t retry_ns = 200'000;
 
 constexpr std::uint8_t command_of(const CanFrame& frame) noexcept { return frame.data[0] >> 5; }
 
@@ -90,7 +92,7 @@ void SdoClient::finish(SdoOutcome outcome, std::uint32_t code) noexcept {
 void SdoClient::abort(std::uint32_t code, SdoOutcome outcome) {
   CanFrame frame = object_request(0x80);
   write_u32_le(&frame.data[4], code);
-  (void)bus_.send(frame);  // if it can't be sent, the server times out
+  (void)bus_.send(frame);  // if the abort can't be sent, the server times out
   finish(outcome, code);
 }
 
@@ -140,7 +142,7 @@ void SdoClient::poll(std::int64_t now_ns) {
     if (finished()) return;
   }
   if (now_ns < deadline_ns_) return;
-  // The last segment of a block may be lost; an acknowledgement of the received ones makes the server continue.
+  // The last segment of a block may be lost. Acknowledging the received segments makes the server send the rest again.
   if (step_ == Step::block_upload_segments && repeats_ < config_.max_block_repeats) {
     ++repeats_;
     acknowledge_block();
@@ -158,10 +160,12 @@ bool SdoClient::on_frame(const CanFrame& frame, std::int64_t now_ns) {
     return true;
   }
   now_ns_ = now_ns;
-  // In a block upload, a segment has no command: its first byte is a sequence number. 0 marks an abort (80h).
+  // In a block upload, a segment has no command: its first byte is a sequence number with bit 7 as the end mark. No
+  // segment has the number 0, so 80h marks an abort.
   const bool is_segment = step_ == Step::block_upload_segments && frame.data[0] != 0x80;
   if (!is_segment && command_of(frame) == 4) {
-    // An abort names the object, or no object at all; an abort of another object is a late answer.
+    // An abort names the object of its transfer, or no object at all. An abort that names another object is a late
+    // answer to an earlier transfer.
     const bool nameless = frame.length >= 4 && read_u16_le(&frame.data[1]) == 0;
     if (frame.length >= 8 && (names_object(frame, object_) || nameless)) {
       finish(SdoOutcome::aborted_by_server, read_u32_le(&frame.data[4]));
@@ -226,13 +230,13 @@ void SdoClient::complete_upload() {
 
 void SdoClient::on_upload_initiate(const CanFrame& frame) {
   if (command_of(frame) != 2 || !names_object(frame, object_)) {
-    ++stale_answers_;  // late answer to an aborted transfer
+    ++stale_answers_;  // a late answer to an aborted transfer
     return;
   }
   const std::uint8_t command = frame.data[0];
   const bool expedited = (command & 2) != 0, size_given = (command & 1) != 0;
   if (expedited) {
-    // Without a size all four bytes count; some nodes send only the object's bytes.
+    // Without a size, all four data bytes count; some nodes then send only as many bytes as the object has.
     const std::size_t count = size_given ? 4U - (command >> 2 & 3U) : std::min<std::size_t>(4, frame.length - 4U);
     if (frame.length < 4U + count) {
       abort(sdo_abort::length_mismatch);

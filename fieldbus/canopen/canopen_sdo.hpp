@@ -1,16 +1,22 @@
 // SDO client (CiA 301, 7.2.4): reads and writes a node's objects, one transfer at a time.
 //
-// Wire: request 600 + node, answer 580 + node, eight bytes each, numbers little-endian. Byte 0 holds the command:
-//   upload   initiate 40 → 4x expedited (n = bytes unused, bits 2–3), 41 segmented with size; segment 60|t<<4 → t|n|c
-//   download initiate 2x expedited, 21 segmented with size → 60; segment t<<4|n<<1|c → 20|t<<4
-//   block download C6 → A4 blksize; 7-byte segments numbered 1..blksize (bit 7: last) → A2 ackseq blksize;
-//                  C1|n<<2 crc → A1
-//   block upload   A4 blksize → C6 size; A3 → segments; A2 ackseq blksize; C1|n<<2 crc → A1
-//   abort          80, object, code (either side, at any time)
+// Wire: request 600 + node, answer 580 + node, eight bytes each, numbers little-endian. Byte 0 holds the command (hex).
+// In the table, → separates request and answer, n counts unused bytes, t is the toggle bit, c marks the last segment:
+//   upload           40 → 4x expedited (n in bits 2–3), or 41 segmented with size
+//     each segment   60|t<<4 → t|n|c
+//   download         2x expedited, or 21 segmented with size → 60
+//     each segment   t<<4|n<<1|c → 20|t<<4
+//   block download   C6 → A4 blksize
+//     each block     7-byte segments numbered 1..blksize (bit 7: last segment) → A2 ackseq blksize
+//     end            C1|n<<2 crc → A1
+//   block upload     A4 blksize → C6 size
+//     each block     A3 → segments; A2 ackseq blksize → further segments
+//     end            C1|n<<2 crc (from the server) → A1
+//   abort            80, object, code (from either side, at any time)
 //
-// SdoClient is a state machine that never blocks: it gets frames and the time, and reports whether the transfer has
-// finished. Several can run side by side, one per node, as a node has one SDO channel. For use before and after the
-// cycle, never in it: it allocates.
+// SdoClient is a state machine that never blocks. Its caller passes it frames and the time; finished() reports whether
+// the transfer has finished. Several clients can run side by side, but only one per node, because a node has one SDO
+// channel. Use it only before and after the cycle, because it allocates.
 #pragma once
 
 #include <cstdint>
@@ -25,31 +31,33 @@
 namespace proxarm::fieldbus {
 
 enum class SdoOutcome : std::uint8_t {
-  idle,  // nothing requested yet
+  idle,  // no transfer has been started yet
   running,
-  done,               // data() has the value read
-  aborted_by_server,  // see abort_code()
-  aborted_by_client,  // the answer broke the protocol; abort_code() was sent to the server
-  timed_out,          // no answer in time; abort 05040000 was sent to the server
-  not_sent,           // bus off or interface down
+  done,               // the transfer succeeded; data() has the value read
+  aborted_by_server,  // the server aborted the transfer; see abort_code()
+  aborted_by_client,  // the server's answer broke the protocol; abort_code() was sent to the server
+  timed_out,          // no answer came in time; abort 05040000 was sent to the server
+  not_sent,           // the request wasn't sent: bus off or interface down
 };
 
 enum class SdoTransfer : std::uint8_t {
-  automatic,  // expedited up to four bytes, else segmented
-  block,      // block transfer for any size
+  automatic,  // expedited up to four bytes, segmented above
+  block,      // block transfer, whatever the size
 };
 
 struct SdoClientConfig {
-  std::int64_t timeout_ns = 200'000'000;    // for each answer
+  std::int64_t timeout_ns = 200'000'000;    // how long to wait for each answer
   std::uint8_t block_size = 127;            // segments in a block upload, 1..127
-  std::size_t max_upload_bytes = 1U << 20;  // a server that sends more is aborted (05040005)
-  int max_block_repeats = 3;                // sub-blocks sent or requested again without progress
+  std::size_t max_upload_bytes = 1U << 20;  // if a server sends more bytes, the transfer is aborted (05040005)
+  int max_block_repeats = 3;                // how often a block may be sent or requested again without progress
 };
 
-// CRC-16 of block transfers: x¹⁶ + x¹² + x⁵ + 1, start 0, not reflected. The string "123456789" gives 31C3.
+// Computes the CRC-16 of block transfers: x¹⁶ + x¹² + x⁵ + 1, initial value 0, not reflected. The string "123456789"
+// gives 31C3.
 [[nodiscard]] std::uint16_t sdo_crc(std::span<const std::uint8_t> bytes, std::uint16_t crc = 0) noexcept;
 
-// Requests of one frame, for callers that match the answers themselves, as the cycle does. `bytes`: 1 to 4.
+// Return requests of one frame, for callers such as the cycle that match requests and answers themselves. Precondition:
+// `bytes` is 1 to 4.
 [[nodiscard]] CanFrame expedited_download(std::uint8_t node, ObjectAddress object, std::uint8_t bytes,
                                           std::uint32_t value) noexcept;
 [[nodiscard]] CanFrame upload_request(std::uint8_t node, ObjectAddress object) noexcept;
@@ -60,14 +68,15 @@ class SdoClient {
  public:
   SdoClient(CanBus& bus, std::uint8_t node, const SdoClientConfig& config = {});
 
-  // Each aborts a running transfer (also at the server) and starts a new one.
+  // Each function starts a new transfer. If another transfer is running, it is first aborted, at the server too.
   void start_upload(ObjectAddress object, std::int64_t now_ns, SdoTransfer transfer = SdoTransfer::automatic);
   void start_download(ObjectAddress object, std::span<const std::uint8_t> data, std::int64_t now_ns,
                       SdoTransfer transfer = SdoTransfer::automatic);
 
-  // True if the frame is an SDO answer of this node. Stale answers are only counted.
+  // True if the frame is an SDO answer of this node. An answer that doesn't fit the running transfer is only counted
+  // (stale_answers()).
   bool on_frame(const CanFrame& frame, std::int64_t now_ns);
-  // Sends a frame that the interface's full queue refused, and detects a missing answer.
+  // Sends a frame again that the interface's full queue refused. Detects a missing answer.
   void poll(std::int64_t now_ns);
 
   [[nodiscard]] bool finished() const noexcept { return outcome_ != SdoOutcome::running; }
@@ -77,7 +86,7 @@ class SdoClient {
   [[nodiscard]] ObjectAddress object() const noexcept { return object_; }
   [[nodiscard]] std::uint8_t node() const noexcept { return node_; }
   [[nodiscard]] std::uint64_t stale_answers() const noexcept { return stale_answers_; }
-  // Latest time for the next call of poll() while running.
+  // Returns the time at which poll() must be called at the latest while a transfer runs.
   [[nodiscard]] std::int64_t wake_ns(std::int64_t now_ns) const noexcept;
 
   [[nodiscard]] static std::uint32_t request_id(std::uint8_t node) noexcept { return 0x600U + node; }
@@ -130,11 +139,11 @@ class SdoClient {
   SdoOutcome outcome_ = SdoOutcome::idle;
   Step step_ = Step::upload_initiate;
   std::uint32_t abort_code_ = 0;
-  std::vector<std::uint8_t> data_;  // read so far, or to be written
+  std::vector<std::uint8_t> data_;  // bytes read so far, or bytes to be written
   std::int64_t now_ns_ = 0;
   std::int64_t deadline_ns_ = 0;
   std::uint64_t stale_answers_ = 0;
-  CanFrame unsent_{};  // waits because the interface's queue was full
+  CanFrame unsent_{};  // a frame that waits because the interface's queue was full
   bool has_unsent_ = false;
 
   bool toggle_ = false;
@@ -144,8 +153,8 @@ class SdoClient {
   std::size_t expected_size_ = 0;
 
   bool crc_used_ = false;
-  std::uint8_t block_size_ = 0;  // segments per block, requested by the server
-  std::uint8_t sequence_ = 0;    // last segment sent, or last one accepted in order
+  std::uint8_t block_size_ = 0;  // segments per block; in a download the server chooses the number
+  std::uint8_t sequence_ = 0;    // number of the last segment sent (download) or accepted in order (upload)
   std::size_t block_start_ = 0;  // position_ at the start of the block
   bool last_segment_ = false;
   int repeats_ = 0;

@@ -30,9 +30,9 @@ inline constexpr std::uint32_t local_control = 0x08000021;
 inline constexpr std::uint32_t device_state = 0x08000022;
 }  // namespace sdo_abort
 
-// The standard's sentence; "unknown abort code" for any other number.
+// Returns the standard's wording of this code, or "unknown abort code" for a number that the standard lacks.
 [[nodiscard]] std::string_view sdo_abort_text(std::uint32_t code) noexcept;
-// "SDO abort 06020000: object does not exist in the object dictionary"
+// Returns for example "SDO abort 06020000: object does not exist in the object dictionary".
 [[nodiscard]] std::string describe_sdo_abort(std::uint32_t code);
 
 }  // namespace proxarm::fieldbus

@@ -23,7 +23,7 @@ std::uint16_t sdo_crc(std::span<const std::uint8_t> bytes, std::uint16_t crc) no
   return crc;
 }
 
-// ---- download: the server reports how many segments it accepts at once, and how many it received in order ----
+// ---- download: the server reports how many segments a block may have, and how many it received in order ----
 
 void SdoClient::on_block_download_initiate(const CanFrame& frame) {
   if (command_of(frame) != 5 || (frame.data[0] & 3) != 0 || frame.length < 5 || !names_object(frame, object_)) {
@@ -47,7 +47,7 @@ void SdoClient::on_block_download_initiate(const CanFrame& frame) {
   }
 }
 
-// Sends until the block ends or the interface's queue is full; poll() then continues.
+// Sends segments until the block ends or the interface's queue is full. After a full queue, poll() continues.
 void SdoClient::send_block_segments() {
   while (!finished() && !has_unsent_ && sequence_ < block_size_ && !last_segment_) {
     const std::size_t count = std::min(segment_size, data_.size() - position_);
@@ -102,13 +102,13 @@ void SdoClient::send_block_end() {
 
 void SdoClient::on_block_download_end(const CanFrame& frame) {
   if (command_of(frame) != 5 || (frame.data[0] & 3) != 1) {
-    ++stale_answers_;  // repeated acknowledgement of the last block
+    ++stale_answers_;  // the acknowledgement of the last block came again
     return;
   }
   finish(SdoOutcome::done);
 }
 
-// ---- upload: the client reports how many segments it accepts at once, and how many it received in order ----
+// ---- upload: the client reports how many segments a block may have, and how many it received in order ----
 
 void SdoClient::on_block_upload_initiate(const CanFrame& frame) {
   if (command_of(frame) != 6 || (frame.data[0] & 1) != 0 || !names_object(frame, object_)) {
@@ -135,7 +135,7 @@ void SdoClient::on_block_upload_segment(const CanFrame& frame) {
     return;
   }
   if (sequence == sequence_ + 1 && !last_segment_) {
-    // Only the very last segment may carry fewer than seven bytes; the end frame says how many count.
+    // Only the transfer's last segment may have fewer than seven bytes; the end frame says how many of them count.
     if (frame.length < 8 && !last) {
       abort(sdo_abort::length_mismatch);
       return;
@@ -146,7 +146,7 @@ void SdoClient::on_block_upload_segment(const CanFrame& frame) {
     repeats_ = 0;
   }
   deadline_ns_ = now_ns_ + config_.timeout_ns;
-  // Segments after a lost one don't count; the acknowledgement at the block's end reports the loss.
+  // Segments after a lost segment are ignored. The acknowledgement at the end of the block reports the loss.
   if (last || sequence == block_size_) acknowledge_block();
 }
 

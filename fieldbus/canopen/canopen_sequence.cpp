@@ -93,7 +93,7 @@ void SdoSequence::ask(bool write, std::int64_t now_ns) {
   } else {
     client_.start_upload(step.object, now_ns);
   }
-  if (client_.finished()) on_answer(now_ns);  // bus off or down
+  if (client_.finished()) on_answer(now_ns);  // the request couldn't be sent: bus off or interface down
 }
 
 void SdoSequence::advance(std::int64_t now_ns) {
@@ -139,7 +139,7 @@ void SdoSequence::on_answer(std::int64_t now_ns) {
 void SdoSequence::on_value(std::int64_t now_ns) {
   const SdoStep& step = steps_[next_];
   const auto data = client_.data();
-  // A node that doesn't report a size sends four bytes; the object's first bytes count.
+  // A node that doesn't report the object's size sends four bytes; the first `step.bytes` of them count.
   if (data.size() < step.bytes || data.size() > 4) {
     fail(std::to_string(data.size()) + " bytes", std::to_string(step.bytes) + " bytes",
          "the object has another type than the profile gives it; is the device of the expected make?");
@@ -168,7 +168,9 @@ void SdoSequence::on_value(std::int64_t now_ns) {
   advance(now_ns);
 }
 
-// Accepts an object that couldn't be written, or didn't change, if it has the wanted or a permitted value.
+// Accepts the object's present value after a write that was refused or had no effect. The value must be the wanted
+// value or one of `as_found`. An optional object without `as_found` may have any value if its write was refused.
+// Otherwise the sequence fails.
 void SdoSequence::take_as_found(std::uint32_t value, std::int64_t now_ns) {
   const SdoStep& step = steps_[next_];
   const auto is = [&](std::uint32_t wanted) { return ((value ^ wanted) & step.mask & size_mask(step.bytes)) == 0; };
@@ -210,8 +212,8 @@ std::vector<std::string> SdoSequence::losses() const {
   return all;
 }
 
-// Whether a write was refused because of the object or because of the value: many nodes have fewer option codes and
-// narrower ranges than the profile. An optional object then keeps the maker's value.
+// Returns whether the node refused the write because of the object or because of the value. Many nodes support fewer
+// option codes and narrower ranges than the profile. A node may therefore keep its maker's value in an optional object.
 SdoSequence::Refused SdoSequence::refused_by(std::uint32_t code) const noexcept {
   constexpr std::uint32_t by_object[] = {sdo_abort::unsupported_access, sdo_abort::write_of_read_only,
                                          sdo_abort::not_transferable, sdo_abort::local_control,
@@ -261,7 +263,7 @@ void SdoSequence::on_failure(std::int64_t now_ns) {
         return;
       }
       if (looks_at_what_is_there(code, now_ns)) return;
-      // If reading fails as well, the refusal of the write is reported.
+      // If reading fails too, the refusal of the write is reported, not the failure of the reading.
       failed_abort_ = refused_ == Refused::no ? code : refusal_;
       fail(describe_sdo_abort(failed_abort_),
            writing_ || refused_ != Refused::no ? "to write " + value_text(step.value, step.bytes)

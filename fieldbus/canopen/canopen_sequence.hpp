@@ -1,7 +1,8 @@
-// Configures a node by a table of SDO steps: each is written and read back, or read and compared.
+// Configures a node by a table of SDO steps. Each step writes an object and reads it back, or reads an object and
+// compares it.
 //
-// Runs on one SdoClient without blocking, so several nodes can be configured side by side. A failure ends the sequence
-// with one SetupProblem: bus, node, object, found, expected and what to do.
+// The sequence runs on one SdoClient without blocking, so several nodes can be configured side by side. A failure ends
+// the sequence with one SetupProblem that says bus, node, object, found value, expected value and what to do.
 #pragma once
 
 #include <cstdint>
@@ -16,26 +17,29 @@ namespace proxarm::fieldbus {
 
 struct SdoStep {
   enum class Kind : std::uint8_t {
-    read,    // read into values()
-    expect,  // read; (value & mask) must be `value`
-    write,   // written, then read back and compared under `mask`
+    read,    // reads the object into values()
+    expect,  // reads the object; (value read & mask) must equal (`value` & mask)
+    write,   // writes the object, reads it back and compares it under `mask`
   };
   Kind kind = Kind::read;
   ObjectAddress object{};
-  std::uint8_t bytes = 4;           // size of the object, 1..4
-  std::uint32_t value = 0;          // as unsigned; negative numbers in two's complement of the object's size
+  std::uint8_t bytes = 4;  // size of the object, 1..4
+  // Wanted value as an unsigned number. A negative number is encoded in two's complement of the object's size.
+  std::uint32_t value = 0;
   std::uint32_t mask = 0xFFFFFFFF;  // bits to be compared
-  const char* name = "";            // "modes of operation", for the message
-  const char* advice = "";          // what the user can do if it differs; "": the default advice
-  // A missing object or refused value is no error; it is noted in missing() or losses().
+  const char* name = "";            // the object's name in messages, such as "modes of operation"
+  const char* advice = "";          // for the message: what the user can do if the value differs; "": a default text
+  // true: a missing object or a refused value isn't an error; it is noted in missing() or losses().
   bool is_optional = false;
-  const char* lost = "";  // what is lost without the object, or with another value; for losses()
-  // write: values that may remain if the node refuses the write or keeps its value, compared under `mask`. If empty and
-  // the write is refused: any value may remain in an optional object; for others the refusal is an error.
+  // For losses(): what is lost if the object is missing or keeps another value.
+  const char* lost = "";
+  // Used by write: values that may remain, compared under `mask`, if the node refuses the write or keeps its old value.
+  // If this list is empty and the write is refused, an optional object may keep any value; for any other object the
+  // refusal is an error.
   std::vector<std::uint32_t> as_found{};
-  std::int64_t patience_ns = 0;  // expect: read again until it holds, at most for this long
-  // expect: the object is a state, or holds a value written earlier, so its default in the EDS is only the value at
-  // power-up. false: it is a constant of the device.
+  std::int64_t patience_ns = 0;  // used by expect: how long the object is read again until it has the wanted value
+  // Used by expect. true: the object is a state, or holds a value written earlier, so the EDS's default for it is only
+  // the value at power-up. false: the object is a constant of the device, so the EDS's default must fit.
   bool is_state = false;
 };
 
@@ -43,17 +47,18 @@ struct SdoStep {
 [[nodiscard]] SdoStep sdo_expect(ObjectAddress object, std::uint8_t bytes, std::uint32_t value, const char* name,
                                  const char* advice = "", std::uint32_t mask = 0xFFFFFFFF);
 [[nodiscard]] SdoStep sdo_write(ObjectAddress object, std::uint8_t bytes, std::uint32_t value, const char* name);
-[[nodiscard]] SdoStep if_present(SdoStep step);  // for objects that the standard leaves to the maker
-// The same, with what is lost without the object.
+// Returns the step as an optional step, for objects that not every device has.
+[[nodiscard]] SdoStep if_present(SdoStep step);
+// Returns the step as an optional step; `lost` says what is lost without the object.
 [[nodiscard]] SdoStep if_present(SdoStep step, const char* lost);
-// A write that may fail if one of these values is found.
+// Returns the write step with values that may remain if the write fails.
 [[nodiscard]] SdoStep or_found(SdoStep step, std::vector<std::uint32_t> values);
 
 struct SdoSequenceConfig {
   SdoClientConfig client{};
-  int attempts = 3;                              // per exchange, so one lost frame doesn't end the set-up
-  std::int64_t first_answer_ns = 2'000'000'000;  // time for the first answer (the node may be booting)
-  std::int64_t pause_ns = 2'000'000;             // between readings of a step with patience
+  int attempts = 3;                              // attempts per request, so that one lost frame doesn't end the set-up
+  std::int64_t first_answer_ns = 2'000'000'000;  // timeout for the first answer (the node may still be booting)
+  std::int64_t pause_ns = 2'000'000;             // pause between two readings of a step with patience_ns
 };
 
 class SdoSequence {
@@ -64,7 +69,7 @@ class SdoSequence {
     bool present = true;
   };
 
-  // `bus_name` and `device` ("drive of axis_1") are for the messages.
+  // `bus_name` and `device` (such as "drive of axis_1") appear in messages.
   SdoSequence(CanBus& bus, std::uint8_t node, std::string bus_name, std::string device, std::vector<SdoStep> steps,
               const SdoSequenceConfig& config = {});
 
@@ -76,18 +81,19 @@ class SdoSequence {
   [[nodiscard]] bool answered() const noexcept { return answered_ever_; }
   [[nodiscard]] const std::optional<description::SetupProblem>& problem() const noexcept { return problem_; }
   [[nodiscard]] const std::vector<Value>& values() const noexcept { return values_; }
-  [[nodiscard]] std::optional<std::uint32_t> value_of(ObjectAddress object) const noexcept;  // last reading
-  // Missing optional objects: "1006h:00 communication cycle period".
+  [[nodiscard]] std::optional<std::uint32_t> value_of(ObjectAddress object) const noexcept;  // the value read last
+  // Returns the missing optional objects, such as "1006h:00 communication cycle period".
   [[nodiscard]] const std::vector<std::string>& missing() const noexcept { return missing_; }
-  // One line per loss: missing objects, values it can't take, and objects taken as found.
+  // Returns one line for each missing object that matters, one for each value that the node can't take, and one line
+  // with all objects that couldn't be written but already had a fitting value.
   [[nodiscard]] std::vector<std::string> losses() const;
-  // After a problem: the failed step and its abort code (0 if it wasn't aborted).
+  // After a problem: the step that failed, and its SDO abort code (0 if no abort ended it).
   [[nodiscard]] const SdoStep& failed_step() const noexcept { return steps_[next_]; }
   [[nodiscard]] std::uint32_t failed_abort() const noexcept { return failed_abort_; }
   [[nodiscard]] std::int64_t wake_ns(std::int64_t now_ns) const noexcept;
 
  private:
-  enum class Refused : std::uint8_t { no, object, value };  // why the node refused a write
+  enum class Refused : std::uint8_t { no, object, value };  // why the node refused a write; no: it didn't refuse
 
   void begin_step(std::int64_t now_ns);
   void ask(bool write, std::int64_t now_ns);
@@ -113,13 +119,13 @@ class SdoSequence {
   int attempt_ = 0;
   std::int64_t begun_ns_ = 0;
   std::int64_t step_begun_ns_ = 0;
-  std::int64_t again_at_ns_ = -1;  // end of a pause; −1: no pause
+  std::int64_t again_at_ns_ = -1;  // end of the pause between two readings; −1: no pause
   std::vector<Value> values_;
   std::vector<std::string> missing_;
   std::vector<std::string> losses_;
-  std::string fixed_;  // objects that were taken as found, joined by commas
+  std::string fixed_;  // objects that couldn't be written but already fitted, joined by commas
   Refused refused_ = Refused::no;
-  std::uint32_t refusal_ = 0;  // abort code of that refusal
+  std::uint32_t refusal_ = 0;  // SDO abort code with which the node refused the write
   std::uint32_t failed_abort_ = 0;
   std::optional<description::SetupProblem> problem_;
 };

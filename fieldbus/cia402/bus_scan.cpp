@@ -35,8 +35,9 @@ struct Answer {
   std::optional<std::uint32_t> value;
 };
 
-// Byte 0: 80 is an abort; 010x nnes with e set is expedited (with s set, nn of the four bytes are unused). Longer
-// objects aren't read.
+// Decodes the answer to an SDO upload of `object`; nullopt if the frame is no such answer. Byte 0 is 80 for an abort.
+// For an expedited answer it is 010x nnes with e = 1; if s = 1, nn is the number of unused bytes of the four. Objects
+// of more than four bytes aren't read.
 std::optional<Answer> answer_of(const CanFrame& frame, std::uint8_t node, ObjectAddress object) {
   if (frame.extended || frame.remote || frame.error || frame.length != 8 || frame.id != from_server + node) return {};
   if (read_u16_le(&frame.data[1]) != object.index || frame.data[3] != object.sub) return {};
@@ -106,7 +107,8 @@ class Scan {
     }
   }
 
-  // Operation 0 of an ATI Net CAN OEM: status, SG0, SG2, SG4, then SG1, SG3, SG5.
+  // Polls an ATI Net CAN OEM by its operation 0. The first answer holds status, SG0, SG2 and SG4, the second SG1, SG3
+  // and SG5.
   void poll_sensor(std::uint32_t base_id, ScanResult& result) {
     CanFrame request;
     request.id = base_id << 4;
@@ -139,7 +141,7 @@ class Scan {
   }
 
   void send(const CanFrame& frame) {
-    // A full queue empties within a few frames.
+    // A full queue has space again after a few frames, so the frame is sent again after a pause.
     SendResult sent = network_.bus(bus_).send(frame);
     for (int attempt = 0; sent == SendResult::queue_full && attempt < 20; ++attempt) {
       network_.sleep_until(network_.now_ns() + settings_.between_nodes_ns);

@@ -69,7 +69,8 @@ DriveIdentity identity_of(const SdoSequence& sequence) {
           value(0x1018, 4), value(0x6502, 0), sequence.missing()};
 }
 
-// True if a drive refused feedback that can be left out; then all drives must be configured again.
+// True if a drive refused to map optional feedback. The drive then gives up this feedback, and all drives must be
+// configured again.
 bool some_feedback_given_up(Slots drives, const std::vector<SdoSequence>& sequences) {
   bool given_up = false;
   for (std::size_t i = 0; i < sequences.size(); ++i) {
@@ -79,7 +80,8 @@ bool some_feedback_given_up(Slots drives, const std::vector<SdoSequence>& sequen
   return given_up;
 }
 
-// One exchange with every drive, side by side. nullopt: feedback was left out, so it must be repeated.
+// Runs one exchange with every drive, side by side. Returns nullopt if a drive gave up feedback; the exchange must then
+// be repeated.
 std::optional<std::vector<DriveIdentity>> try_to_configure(CanNetwork& network, Slots drives,
                                                            const FrameHandler& handler, const StepsOf& steps_of) {
   std::vector<std::uint64_t> boot_ups;
@@ -95,7 +97,8 @@ std::optional<std::vector<DriveIdentity>> try_to_configure(CanNetwork& network, 
   return identities;
 }
 
-// Ends, since each repetition has less feedback.
+// Configures the drives until no drive gives up feedback. The loop ends because each repetition has less feedback than
+// the one before.
 std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const FrameHandler& handler,
                                      const StepsOf& steps_of) {
   for (;;) {

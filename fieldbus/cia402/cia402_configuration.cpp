@@ -1,4 +1,4 @@
-// The configuration of a CiA 402 drive before the cycle, and descriptions of the drive in words.
+// The configuration of a CiA 402 drive before the cycle starts, and texts about the drive's problems.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -17,13 +17,13 @@ namespace {
 using description::number_text;
 using description::SetupError;
 
-constexpr std::uint32_t servo_drive = 0x00020192;       // 1000h: CiA 402, of type servo drive
-constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h with a delay
+constexpr std::uint32_t servo_drive = 0x00020192;       // value of 1000h: CiA 402, servo drive
+constexpr std::int64_t mode_patience_ns = 500'000'000;  // how long 6061h may take to show the mode written to 6060h
 
 constexpr const char* period_advice =
     "take a period of one to three digits of microseconds or milliseconds, such as 0.5ms, 1ms, 2ms, 4ms";
 
-// The session's settings with this drive's timeouts.
+// Returns the session's settings, with the timeouts that the cell sets for this drive.
 DriveSettings settings_of(const description::DriveDescription& drive, DriveSettings settings) {
   settings.validate();
   const auto to_ns = [](double seconds) { return std::llround(1e9 * seconds); };
@@ -66,7 +66,7 @@ void append(std::vector<SdoStep>& steps, const std::vector<SdoStep>& more) {
 }
 
 void append_identity(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
-  // This first step also shows whether the node exists at all.
+  // This first step also shows whether a node with this number exists.
   steps.push_back(
       sdo_expect({0x1000, 0}, 4, drive.device_type.value_or(servo_drive), "device type",
                  "is another device set to this node, or is device_type in the cell's file not this drive's?"));
@@ -80,7 +80,8 @@ void append_identity(std::vector<SdoStep>& steps, const description::DriveDescri
                              mode.unsupported, supported));
 }
 
-// First disables all other PDOs, to leave the bus to the cycle.
+// Appends the steps for PDO 1 in both directions. All other PDOs are disabled first, so that only the cycle's PDOs load
+// the bus.
 void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescription& drive, std::uint16_t timeout_ms,
                  std::uint32_t inputs_object, bool torque_feedback) {
   const std::uint8_t node = drive.node;
@@ -95,8 +96,9 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .event_timer_ms = timeout_ms,
                            .fd = drive.fd,
                            .mapping = rpdo_mapping(drive)}));
-  // The last torque acts until this timer runs out, or else until the heartbeat's timeout. For a drive that doesn't
-  // watch the heartbeat, the timer is the only stop.
+  // In torque mode, the last torque acts until the RPDO timer runs out. Without the timer it would act until the
+  // heartbeat timeout. For a drive with `stops_by: setpoint_timer`, the timer is the only means that stops it. In both
+  // cases the timer is required.
   if (mode_of(drive).torque || drive.bring_up.stops_by == description::StopsBy::setpoint_timer) {
     for (SdoStep& step : steps) {
       if (step.object == ObjectAddress{0x1400, 5}) step.is_optional = false;
@@ -118,21 +120,22 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .mapping = {{object_address(inputs_object), 32}}}));
 }
 
-// The drive itself limits torque and speed to the cell's values. 6076h is the motor's torque before the gear, in mNm.
+// Appends the steps by which the drive itself limits torque and speed to the cell's values. 6076h is the rated torque
+// of the motor before the gear, in mNm.
 void append_torque(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
   const auto rated_mNm = static_cast<std::uint32_t>(std::llround(1e3 * drive.rated_torque_Nm / drive.gear_ratio));
   const auto most = static_cast<std::uint32_t>(std::llround(1e3 * drive.max_torque_Nm / drive.rated_torque_Nm));
   const double rpm = 60.0 / (2.0 * std::numbers::pi) * drive.max_speed_rad_per_s * drive.gear_ratio;
   SdoStep rated = sdo_expect({0x6076, 0}, 4, rated_mNm, "motor rated torque (mNm)",
                              "is rated_torque_Nm in the cell's file this motor's, times its gear_ratio?");
-  rated.is_state = true;  // the drive gets its motor's data at set-up
+  rated.is_state = true;  // the motor's data are entered in the drive at set-up
   steps.push_back(if_present(rated));
   steps.push_back(sdo_write({0x6072, 0}, 2, most, "max torque"));
   steps.push_back(if_present(sdo_write({0x6080, 0}, 4, static_cast<std::uint32_t>(std::ceil(rpm)), "max motor speed")));
 }
 
-// Lets the drive watch the controller. First off, as a drive that still watches for the last session's controller would
-// trip during this set-up.
+// Makes the drive watch the controller's heartbeat. The watch is first switched off: a drive that still watched for the
+// last session's controller would trip during this set-up.
 void append_heartbeat(std::vector<SdoStep>& steps, std::uint32_t consumer) {
   for (const std::uint32_t value : {0U, consumer}) {
     SdoStep step = sdo_write({0x1016, 1}, 4, value, "consumer heartbeat time (of the controller)");
@@ -144,7 +147,8 @@ void append_heartbeat(std::vector<SdoStep>& steps, std::uint32_t consumer) {
   }
 }
 
-// The same by life guarding (CiA 301): the drive stops if its state isn't requested for guard time × factor.
+// Makes the drive watch the controller by life guarding (CiA 301). The drive stops if its state isn't requested for
+// guard time × life time factor.
 void append_life_guarding(std::vector<SdoStep>& steps, const DriveSettings& settings) {
   for (const std::uint32_t time_ms : {0U, std::uint32_t{settings.master_heartbeat_ms}}) {
     steps.push_back(sdo_write({0x100C, 0}, 2, time_ms, "guard time (of the controller)"));
@@ -152,7 +156,7 @@ void append_life_guarding(std::vector<SdoStep>& steps, const DriveSettings& sett
   steps.push_back(sdo_write({0x100D, 0}, 1, settings.life_time_factor(), "life time factor"));
 }
 
-// Values that the drive needs before its PDOs are mapped.
+// Appends the writes of the cell's `bring_up`. The drive needs these values before its PDOs are mapped.
 void append_start_up(std::vector<SdoStep>& steps, const description::BringUp& bring_up) {
   for (const description::StartUpWrite& write : bring_up.write) {
     steps.push_back(sdo_write(object_address(write.object), static_cast<std::uint8_t>(write.bits / 8), write.value,
@@ -160,15 +164,17 @@ void append_start_up(std::vector<SdoStep>& steps, const description::BringUp& br
   }
 }
 
-// Reactions to a lost controller, and to stops. 1016h is required, since it stops the arm when the controller dies,
-// unless the cell names another means. The other objects have defaults in the standard that also stop it.
+// Appends the drive's reactions to a lost controller and to stop commands. The object that stops the drive when the
+// controller dies is required: 1016h, or 100Ch with `stops_by: life_guarding`. The other objects are optional, because
+// their defaults in the standard stop the arm too.
 void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings,
                       const description::BringUp& bring_up) {
   if (bring_up.stops_by == description::StopsBy::heartbeat) append_heartbeat(steps, settings.consumer_heartbeat());
   if (bring_up.stops_by == description::StopsBy::life_guarding) append_life_guarding(steps, settings);
   steps.push_back(sdo_write({0x1017, 0}, 2, settings.drive_heartbeat_ms, "producer heartbeat time"));
   steps.push_back(if_present(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));
-  // If the maker fixed it: fault (1) and disable voltage (2) also stop the arm; no action (0) is refused.
+  // If the maker has fixed this option, fault (1) and disable voltage (2) are accepted, because they stop the arm too.
+  // No action (0) is refused.
   steps.push_back(or_found(if_present(sdo_write({0x6007, 0}, 2, 3, "abort connection option code (quick stop)"),
                                       "how it stops without the controller is its own affair"),
                            {3, 1, 2}));
@@ -192,7 +198,8 @@ PeriodSteps ServoDrive::period_steps(std::int64_t from_ns, std::int64_t to_ns) c
   PeriodStep value{object_address(description_.objects.interpolation_value), 1, to.units, from.units};
   PeriodStep index{object_address(description_.objects.interpolation_index), 1, as_u8(to.exponent),
                    as_u8(from.exponent)};
-  // Between the writes the period is to.units · 10^from.exponent, or from.units · 10^to.exponent.
+  // Between the two writes the drive has an interim period: to.units · 10^from.exponent if the value is written first,
+  // from.units · 10^to.exponent if the exponent is written first. The longer interim period is chosen.
   const bool value_first = to.units * std::pow(10.0, from.exponent) >= from.units * std::pow(10.0, to.exponent);
   const PeriodStep sync{{0x1006, 0}, 4, sync_period_us(to_ns).value_or(0), sync_period_us(from_ns).value_or(0), true};
   const PeriodStep timer{{0x1400, 5},
@@ -272,12 +279,12 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
   if (!description_.device_type) description_.device_type = cia402_device_type(*eds_);
   leave_out_what_eds_lacks();
   EdsLosses losses;
-  (void)steps_by_eds(profile_steps(), *eds_, description_, &losses);  // for its losses and its SetupErrors
+  (void)steps_by_eds(profile_steps(), *eds_, description_, &losses);  // called for the losses and SetupErrors
   losses_.insert(losses_.end(), losses.missing.begin(), losses.missing.end());
   fixed_by_eds_ = losses.fixed;
 }
 
-// Must not be left out: stability was judged with it.
+// True for the cell's `gear_torque`. This feedback must not be left out, because stability was judged with it.
 bool ServoDrive::is_gear_torque(const MappedObject& object) const noexcept {
   return description_.gear_torque && object.object == object_address(description_.gear_torque->object);
 }
@@ -331,7 +338,8 @@ std::vector<std::string> ServoDrive::losses() const {
   return all;
 }
 
-// 6071h holds thousandths of the rated torque, in 16 bits.
+// Prepares torque mode. 6071h holds the torque in thousandths of the rated torque, as a 16-bit number, so at most
+// 32.767 times the rated torque.
 void ServoDrive::set_up_torque() {
   if (!(description_.rated_torque_Nm > 0.0)) {
     refuse(description_, "rated_torque_Nm", number_text(description_.rated_torque_Nm), "more than 0 Nm");
@@ -361,7 +369,7 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
   return steps;
 }
 
-// Refuses to skip a step that isn't optional.
+// Notes as losses the steps that the cell skips. Throws SetupError if a skipped step isn't optional.
 void ServoDrive::note_skipped() {
   const std::vector<SdoStep> steps = all_profile_steps();
   for (const std::uint32_t object : description_.bring_up.skip) {
@@ -393,7 +401,7 @@ std::vector<SdoStep> ServoDrive::all_profile_steps() const {
   append_start_up(steps, description_.bring_up);
   append_pdos(steps, description_, rpdo_timeout_ms(settings_, settings_.period_ns, mode_.torque),
               settings_.inputs_object, torque_feedback_);
-  // A drive may have fixed one of both; that is fine if it is the needed value.
+  // A drive may have fixed the value or the exponent of 60C2h. A fixed number is accepted if it is the needed one.
   steps.push_back(or_found(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,
                                      "interpolation time period value"),
                            {period.units}));
@@ -403,7 +411,7 @@ std::vector<SdoStep> ServoDrive::all_profile_steps() const {
   steps.push_back(
       if_present(sdo_write({0x1006, 0}, 4, *sync_period_us(settings_.period_ns), "communication cycle period")));
   append_reactions(steps, settings_, description_.bring_up);
-  // Deceleration of these stops, in counts/s² (the profile's default unit).
+  // The deceleration on quick stop and on slow down, in counts/s² (the profile's default unit).
   if (const auto ramp = scale_.size_counts(description_.max_acceleration_rad_per_s2); ramp && *ramp > 0) {
     steps.push_back(if_present(sdo_write({0x6084, 0}, 4, *ramp, "profile deceleration")));
     steps.push_back(if_present(sdo_write({0x6085, 0}, 4, *ramp, "quick stop deceleration")));
@@ -415,7 +423,7 @@ std::vector<SdoStep> ServoDrive::all_profile_steps() const {
   if (mode_.torque) append_torque(steps, description_);
   steps.push_back(or_found(sdo_write(object_address(description_.objects.mode), 1, mode_.number, "modes of operation"),
                            {mode_.number}));
-  if (description_.bring_up.shows_mode_enabled) return steps;  // the cycle watches it in TPDO1
+  if (description_.bring_up.shows_mode_enabled) return steps;  // the cycle watches the mode in TPDO1
   SdoStep display = sdo_expect(object_address(description_.objects.mode_display), 1, mode_.number,
                                "modes of operation display", mode_.not_taken);
   display.is_state = true;
@@ -424,7 +432,7 @@ std::vector<SdoStep> ServoDrive::all_profile_steps() const {
   return steps;
 }
 
-// The state in which enabling was abandoned, and what the user should look for.
+// Says in which state the drive stayed when enabling was abandoned, and what the user should look for.
 std::string ServoDrive::stuck_text() const {
   const auto word = static_cast<std::uint16_t>(stuck_);
   const DriveState state = decode_state(word);

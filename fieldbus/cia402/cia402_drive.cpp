@@ -11,8 +11,10 @@
 namespace proxarm::fieldbus {
 namespace {
 
-constexpr int syncs_before_enable = 3;  // with target = actual, before 0F
-// Consecutive cycles with two TPDOs that mean two nodes. Late and doubled frames of a bad line don't come at each SYNC.
+// How many SYNCs must have latched a target equal to the actual position before controlword 0F is sent.
+constexpr int syncs_before_enable = 3;
+// After this many consecutive cycles with two TPDOs, two drives must have one node number. A bad line also delays and
+// doubles frames, but not at each SYNC.
 constexpr std::uint32_t most_doubled_cycles = 10;
 
 }  // namespace
@@ -34,7 +36,7 @@ void ServoDrive::start_cycle(std::int64_t now_ns) noexcept {
   boot_ups_at_start_ = heartbeat_.boot_ups();
   tpdos_in_cycle_ = doubled_cycles_ = 0;
   cycles_without_tpdo_ = 0;
-  fresh_ = true;  // no TPDO was due before the first SYNC
+  fresh_ = true;  // before the first SYNC no TPDO is missing
 }
 
 void ServoDrive::raise(DriveFault fault) noexcept {
@@ -56,7 +58,7 @@ void ServoDrive::judge_doubled() noexcept {
 
 void ServoDrive::on_sync(std::int64_t now_ns) noexcept {
   judge_doubled();
-  // This SYNC makes the drive latch the RPDO sent before.
+  // This SYNC makes the drive latch the RPDO that was sent before it.
   if (held_pending_) ++held_;
   held_pending_ = false;
   if (!fresh_ && cycles_without_tpdo_ < UINT32_MAX) ++cycles_without_tpdo_;
@@ -68,10 +70,10 @@ bool ServoDrive::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept 
   if (frame.extended || frame.remote || frame.error) return false;
   if (frame.id == pdo_id(PdoDirection::transmit, 1, node())) return decode_tpdo(frame);
   if (Emergency emergency; decode_emcy(frame, time_ns, node(), emergency)) {
-    if (emergency.code == 0) return true;  // reports the end of an error; the latest error stays readable
+    if (emergency.code == 0) return true;  // this EMCY reports the end of an error; emergency_ keeps the latest error
     emergency_ = emergency;
     ++emergencies_;
-    if (frame.length > 2 && is_warning(emergency)) {  // includes an error register
+    if (frame.length > 2 && is_warning(emergency)) {  // only a frame with an error register can be a warning
       ++warnings_;
       return true;
     }
@@ -113,7 +115,8 @@ bool ServoDrive::decode_tpdo(const CanFrame& frame) noexcept {
   state_ = decode_state(statusword_);
   const bool enabled = state_ == DriveState::operation_enabled;
   if (state_ != DriveState::switched_on) held_ = 0;
-  // Once following, it stays so until it leaves operation enabled: bit 12 may drop at a limit.
+  // A drive that follows targets counts as following until it leaves operation enabled, because bit 12 may drop at a
+  // limit.
   following_ = enabled && (following_ || (follows_command() && shows_mode()));
   if (goal_ == DriveGoal::operation_enabled) judge_state(was_enabled);
   return true;
@@ -174,7 +177,7 @@ bool ServoDrive::guard_request(CanFrame& frame) const noexcept {
   frame = CanFrame{};
   frame.id = heartbeat_id(node());
   frame.remote = true;
-  frame.length = 1;  // length of the answer
+  frame.length = 1;  // length of the requested answer
   return true;
 }
 
@@ -190,7 +193,7 @@ bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
   frame = CanFrame{};
   frame.id = pdo_id(PdoDirection::receive, 1, node());
   frame.fd = frame.bit_rate_switch = description_.fd;
-  frame.length = rpdo_bytes_;  // 4 or 6, also valid lengths of CAN FD
+  frame.length = rpdo_bytes_;  // 4 or 6 bytes, which are valid lengths of CAN FD too
   const unsigned bits = mode_.controlword_bits | description_.bring_up.controlword_bits;
   const bool enables = controlword_ == controlword::enable_operation;
   write_u16_le(&frame.data[0], static_cast<std::uint16_t>(controlword_ | (enables ? bits : 0U)));

@@ -15,7 +15,8 @@ struct Watched {
 };
 constexpr std::uint8_t watched_objects = 2;
 
-// In the order of writing: a missing controller trips more drives than a missing SYNC.
+// Returns the object whose watch is switched off in this step. The watch for the controller comes before that for SYNC,
+// because more drives trip on a missing controller than on a missing SYNC.
 Watched watched_by(const ServoDrive& drive, std::uint8_t step) noexcept {
   if (step > 0) return {{0x1006, 0}, 4};
   const bool guards = drive.description().bring_up.stops_by == description::StopsBy::life_guarding;
@@ -23,12 +24,12 @@ Watched watched_by(const ServoDrive& drive, std::uint8_t step) noexcept {
 }
 
 constexpr std::int64_t ms = 1'000'000;
-// Most drives need two periods from ready to switch on (no power) to switch on disabled. A drive that stays gets its
-// requests after this time.
+// How long a drive may take from ready to switch on (no power) to switch on disabled. Most drives take two periods. A
+// drive that is still ready to switch on after this time gets its requests in that state.
 constexpr std::int64_t patience_ns = 100 * ms;
-// Drives answer within some milliseconds; a lost frame isn't worth a longer wait.
+// Timeout for each answer. Drives answer within some milliseconds. If a frame is lost, waiting longer is of no use.
 constexpr std::int64_t answer_timeout_ns = 50 * ms;
-// Limit for all drives. Six drives on one bus take some 30 ms.
+// Time limit for the goodbye to all drives. Six drives on one bus take about 30 ms.
 constexpr std::int64_t limit_ns = 300 * ms;
 
 }  // namespace
@@ -71,7 +72,7 @@ bool Goodbye::next_request(std::int64_t now_ns, std::size_t& bus, CanFrame& fram
   return false;
 }
 
-// A confirmation and an abort both end a step.
+// A confirmation and an abort both end the step.
 bool Goodbye::on_frame(std::size_t bus, const CanFrame& frame) noexcept {
   if (frame.extended || frame.remote || frame.error) return false;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {

@@ -41,9 +41,10 @@ std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& driv
 
 namespace {
 
-constexpr unsigned statusword_and_position = 16 + 32, actual_torque = 16;  // bits
+constexpr unsigned statusword_and_position = 16 + 32, actual_torque = 16;  // sizes in bits
 
-// First byte of an object in the cell's `feedback`, which begins after `bits` bits.
+// Returns the first byte of an object of the cell's `feedback` in TPDO1, or nullopt. `bits` is the size of the objects
+// before the feedback.
 std::optional<std::uint8_t> feedback_byte(const description::DriveDescription& drive, std::uint32_t object,
                                           std::uint8_t wide, unsigned bits) noexcept {
   for (const description::DriveFeedback& more : drive.feedback) {

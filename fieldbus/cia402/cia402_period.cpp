@@ -42,7 +42,8 @@ bool PeriodExchange::done() const noexcept {
   return !failed_ && std::none_of(nodes_.begin(), nodes_.end(), [](const Node& node) { return node.wanted; });
 }
 
-// The way back has the opposite order, so that a drive halfway has no further period in between.
+// Returns the step that the drive is to execute now. When the old period is restored, the steps come in the opposite
+// order, so that a drive in which only half of 60C2h was changed passes through no further interim period.
 PeriodStep PeriodExchange::step_of(std::size_t drive) const noexcept {
   const PeriodSteps steps = drives_[drive].drive->period_steps(from_ns_, to_ns_);
   const std::size_t i = std::min<std::size_t>(nodes_[drive].step, steps.size() - 1);
@@ -73,7 +74,7 @@ bool PeriodExchange::next_request(std::int64_t now_ns, std::size_t& bus, CanFram
   return false;
 }
 
-// Skips objects that have the same value in both periods.
+// Skips objects whose value is the same in both periods.
 void PeriodExchange::skip_unchanged(std::size_t drive) noexcept {
   Node& node = nodes_[drive];
   for (; node.step < PeriodSteps().size(); ++node.step) {
@@ -109,7 +110,7 @@ bool PeriodExchange::on_frame(std::size_t bus, const CanFrame& frame) noexcept {
   return false;
 }
 
-// Ignores an answer that doesn't match the request: it is a late one.
+// Handles the answer to the drive's current request. An answer that doesn't match the request is late and is ignored.
 void PeriodExchange::on_answer(std::size_t drive, const CanFrame& frame) noexcept {
   Node& node = nodes_[drive];
   const PeriodStep step = step_of(drive);
@@ -146,7 +147,7 @@ void PeriodExchange::on_cycle(std::int64_t now_ns) noexcept {
     Node& node = nodes_[i];
     if (node.waiting == Waiting::nothing || now_ns < node.deadline_ns) continue;
     node.waiting = Waiting::nothing;
-    node.written = false;  // the request may be lost
+    node.written = false;  // the request may have been lost
     node.read_next = back_;
     if (++node.attempt >= attempts) fail(i, sdo_abort::timed_out);
   }
@@ -154,7 +155,7 @@ void PeriodExchange::on_cycle(std::int64_t now_ns) noexcept {
 
 void PeriodExchange::archive(StateArchive& state) noexcept {
   state(from_ns_, to_ns_, back_, failed_, refusal_.drive, refusal_.index, refusal_.sub, refusal_.code);
-  // A value read from a file may be invalid.
+  // A period that was read from a file may be invalid, so it is limited.
   constexpr std::int64_t longest_ns = 1'000'000'000;
   from_ns_ = std::clamp<std::int64_t>(from_ns_, 0, longest_ns);
   to_ns_ = std::clamp<std::int64_t>(to_ns_, 0, longest_ns);

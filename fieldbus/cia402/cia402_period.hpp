@@ -1,16 +1,17 @@
-// Changes the period of CiA 402 drives while the cycle runs and the drives stand still: 60C2h, 1006h and the receive
-// PDO's timer.
+// Changes the period of CiA 402 drives while the cycle runs and the drives stand still: 60C2h, 1006h and the timer of
+// the receive PDO.
 //
-// Each object is written by an expedited SDO download and read back (CiA 301, 7.2.4.3), at most one request per bus and
-// cycle, which delays the cycle's frames by at most one frame. Missing optional objects are left out. The exchange
-// fails if a drive refuses, doesn't answer or keeps another value. take_back() then restores the old period in the
-// objects that were written.
+// Each object is written by an expedited SDO download and read back (CiA 301, 7.2.4.3). At most one request per bus and
+// cycle is sent, which delays the cycle's frames by at most one frame. Missing optional objects are left out. The
+// exchange fails if a drive refuses a request, doesn't answer, or keeps another value than the one written. After a
+// failure, take_back() restores the old period in the objects that were written.
 //
-// 60C2h consists of two objects, value and exponent, so between the two writes the drive has an interim period. The
-// order of the writes makes it the longer one: SYNC then never comes slower than the drive expects, and its supervision
-// doesn't trip. For that, the cycle must run at the shorter of both periods during the exchange.
+// 60C2h consists of two objects, value and exponent, so between the two writes the drive has an interim period. Of the
+// two possible interim periods, the order of the writes chooses the longer one. SYNC then never comes later than the
+// drive expects it, so the drive's supervision doesn't trip. Precondition: during the exchange, the cycle runs at the
+// shorter of the old and the new period.
 //
-// Construct before the cycle; the functions neither allocate, lock nor throw.
+// Construct PeriodExchange before the cycle; its functions neither allocate, lock nor throw.
 #pragma once
 
 #include <array>
@@ -26,42 +27,44 @@
 namespace proxarm::fieldbus {
 
 struct PeriodRefusal {
-  std::int32_t drive = -1;  // index of the slot; −1: no refusal
+  std::int32_t drive = -1;  // index of the drive's slot; −1: no refusal
   std::uint16_t index = 0;
   std::uint8_t sub = 0;
-  std::uint32_t code = 0;  // SDO abort code; 05040000h: no answer; 0: it accepted the value but kept another
+  // SDO abort code. 05040000h: the drive didn't answer. 0: the drive accepted the value but kept another one.
+  std::uint32_t code = 0;
 };
 
 class PeriodExchange {
  public:
   explicit PeriodExchange(std::span<const DriveSlot> drives);
 
-  // Begins. Precondition: 60C2h and 1006h can hold both periods.
+  // Begins the change of all drives from `from_ns` to `to_ns`. Precondition: 60C2h and 1006h can hold both periods.
   void tell(std::int64_t from_ns, std::int64_t to_ns) noexcept;
-  // Returns the drives changed so far to the old period. Precondition: tell() was called.
+  // Begins to restore the old period in the drives that were changed so far. Precondition: tell() was called.
   void take_back() noexcept;
 
-  // The request to be sent now; false if none is due.
+  // Returns true and the request that must be sent now; false if no request is due.
   [[nodiscard]] bool next_request(std::int64_t now_ns, std::size_t& bus, CanFrame& frame) noexcept;
   // True if the frame was an SDO answer of one of the drives.
   bool on_frame(std::size_t bus, const CanFrame& frame) noexcept;
-  // Detects missing answers.
+  // Detects missing answers. Must be called once per cycle.
   void on_cycle(std::int64_t now_ns) noexcept;
 
   [[nodiscard]] bool failed() const noexcept { return failed_; }
   [[nodiscard]] bool done() const noexcept;
-  [[nodiscard]] const PeriodRefusal& refusal() const noexcept { return refusal_; }  // of the last failure
+  // The refusal that caused the last failure.
+  [[nodiscard]] const PeriodRefusal& refusal() const noexcept { return refusal_; }
   void archive(StateArchive& state) noexcept;
 
  private:
-  static constexpr std::uint8_t attempts = 2;  // so that a lost frame doesn't end the exchange
+  static constexpr std::uint8_t attempts = 2;  // attempts per request; one lost frame doesn't make the exchange fail
 
   enum class Waiting : std::uint8_t { nothing, write, read };
   struct Node {
     bool wanted = false;
     bool touched = false;
     Waiting waiting = Waiting::nothing;
-    bool written = false;  // the object of this step has been written
+    bool written = false;  // the drive has confirmed writing the object of this step
     bool read_next = false;
     std::uint8_t step = 0;
     std::uint8_t attempt = 0;
@@ -79,7 +82,7 @@ class PeriodExchange {
   std::vector<DriveSlot> drives_;
   std::vector<Node> nodes_;
   std::int64_t from_ns_ = 0, to_ns_ = 0;
-  bool back_ = false;  // returning to from_ns_
+  bool back_ = false;  // the old period from_ns_ is being restored
   bool failed_ = false;
   PeriodRefusal refusal_;
 };

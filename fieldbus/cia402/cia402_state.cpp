@@ -8,7 +8,7 @@ struct StateRow {
   DriveState state;
 };
 
-// CiA 402-2, statusword: state = word & mask.
+// CiA 402-2, statusword: a drive is in the row's state if statusword & mask equals the row's value.
 constexpr StateRow state_rows[] = {
     {0x004F, 0x0000, DriveState::not_ready_to_switch_on}, {0x004F, 0x0040, DriveState::switch_on_disabled},
     {0x006F, 0x0021, DriveState::ready_to_switch_on},     {0x006F, 0x0023, DriveState::switched_on},
@@ -24,19 +24,21 @@ struct TransitionRow {
 
 namespace cw = controlword;
 
-// For all other combinations the controlword is 00 (disable voltage).
+// For combinations of goal and state that aren't listed, the controlword is 00 (disable voltage).
 constexpr TransitionRow transition_rows[] = {
     {DriveGoal::operation_enabled, DriveState::switch_on_disabled, {cw::shutdown, 2}},
     {DriveGoal::operation_enabled, DriveState::ready_to_switch_on, {cw::switch_on, 3}},
     {DriveGoal::operation_enabled, DriveState::switched_on, {cw::enable_operation, 4}},
     {DriveGoal::operation_enabled, DriveState::operation_enabled, {cw::enable_operation, -1}},
-    // Leaves the stop by disabling voltage (16 would restart the motion, which the standard doesn't recommend either).
+    // Leaves the quick stop by disabling voltage. Transition 16 would restart the motion, and the standard doesn't
+    // recommend it either.
     {DriveGoal::operation_enabled, DriveState::quick_stop_active, {cw::disable_voltage, 12}},
 
     {DriveGoal::switched_off, DriveState::operation_enabled, {cw::shutdown, 8}},
     {DriveGoal::switched_off, DriveState::switched_on, {cw::shutdown, 6}},
     {DriveGoal::switched_off, DriveState::ready_to_switch_on, {cw::disable_voltage, 7}},
-    {DriveGoal::switched_off, DriveState::quick_stop_active, {cw::quick_stop, -1}},  // until its ramp ends
+    // Until the ramp of the quick stop ends.
+    {DriveGoal::switched_off, DriveState::quick_stop_active, {cw::quick_stop, -1}},
 
     {DriveGoal::quick_stop, DriveState::operation_enabled, {cw::quick_stop, 11}},
     {DriveGoal::quick_stop, DriveState::quick_stop_active, {cw::quick_stop, -1}},
@@ -63,7 +65,7 @@ DriveState decode_state(std::uint16_t statusword) noexcept {
 ControlStep next_controlword(DriveState state, DriveGoal goal, std::uint16_t previous_controlword) noexcept {
   for (const TransitionRow& row : transition_rows) {
     if (row.goal != goal || row.from != state) continue;
-    // The reset acts on the rising edge of bit 7, so that bit must be low first.
+    // The rising edge of bit 7 resets the fault. So bit 7 must be sent as 0 once before it is sent as 1.
     if (row.step.transition == 15 && (previous_controlword & cw::fault_reset) != 0) return {cw::disable_voltage, -1};
     return row.step;
   }

@@ -1,5 +1,6 @@
-// The power state machine of a CiA 402 drive: decodes the state from the statusword (6041h), and gives the controlword
-// (6040h) for the next transition towards a goal.
+// The power state machine of a CiA 402 drive. decode_state() gets the state from the statusword (6041h).
+// next_controlword() returns the controlword (6040h) for the next transition towards a goal. In the diagram, each arrow
+// shows the transition's number and its controlword:
 //
 //            0,1                 2: 06          3: 07            4: 0F
 //   start ───────▶ switch on ──────────▶ ready to ────────▶ switched ────────▶ operation ──11: 02──▶ quick stop
@@ -15,7 +16,7 @@
 namespace proxarm::fieldbus {
 
 enum class DriveState : std::uint8_t {
-  not_ready_to_switch_on,  // self-test; left automatically
+  not_ready_to_switch_on,  // self-test; the drive leaves this state by itself
   switch_on_disabled,
   ready_to_switch_on,
   switched_on,
@@ -23,15 +24,15 @@ enum class DriveState : std::uint8_t {
   quick_stop_active,
   fault_reaction_active,  // the drive is stopping
   fault,
-  unknown,  // not in the standard's table
+  unknown,  // the statusword isn't in the standard's table
 };
 
 enum class DriveGoal : std::uint8_t {
-  none,               // controlword 00 in any state
-  operation_enabled,  // faults are not reset
-  switched_off,       // switch on disabled, after the drive's deceleration (605Bh)
-  quick_stop,         // stop on the quick-stop ramp (605Ah), then switch on disabled
-  fault_reset,        // leave the state fault; otherwise as switched_off
+  none,               // sends controlword 00 in any state
+  operation_enabled,  // switches on and enables operation; doesn't reset faults
+  switched_off,       // goes to switch on disabled, after the drive's deceleration (605Bh)
+  quick_stop,         // stops on the quick-stop ramp (605Ah), then goes to switch on disabled
+  fault_reset,        // leaves the state fault; in other states like switched_off
 };
 
 namespace controlword {
@@ -40,7 +41,7 @@ inline constexpr std::uint16_t quick_stop = 0x0002;
 inline constexpr std::uint16_t shutdown = 0x0006;
 inline constexpr std::uint16_t switch_on = 0x0007;
 inline constexpr std::uint16_t enable_operation = 0x000F;
-inline constexpr std::uint16_t fault_reset = 0x0080;  // on the rising edge
+inline constexpr std::uint16_t fault_reset = 0x0080;  // acts on the rising edge
 }  // namespace controlword
 
 namespace statusword {
@@ -49,17 +50,18 @@ inline constexpr std::uint16_t voltage_enabled = 1U << 4;
 inline constexpr std::uint16_t warning = 1U << 7;
 inline constexpr std::uint16_t remote = 1U << 9;  // 0: the drive ignores the controlword
 inline constexpr std::uint16_t internal_limit_active = 1U << 11;
-inline constexpr std::uint16_t follows_command = 1U << 12;  // cyclic modes: the drive follows targets
-inline constexpr std::uint16_t following_error = 1U << 13;  // cyclic modes
+inline constexpr std::uint16_t follows_command = 1U << 12;  // 1, in cyclic modes: the drive follows targets
+inline constexpr std::uint16_t following_error = 1U << 13;  // in cyclic modes
 }  // namespace statusword
 
 struct ControlStep {
   std::uint16_t controlword = 0;
-  int transition = -1;  // the standard's number of the requested transition; −1: keep the state
+  int transition = -1;  // number of the requested transition in the standard; −1: keep the state
 };
 
 [[nodiscard]] DriveState decode_state(std::uint16_t statusword) noexcept;
-// `previous_controlword`: the last one sent, since a fault is reset by a rising edge.
+// Returns the next step from `state` towards `goal`. `previous_controlword` is the controlword sent last; it is needed
+// because a fault is reset by a rising edge.
 [[nodiscard]] ControlStep next_controlword(DriveState state, DriveGoal goal,
                                            std::uint16_t previous_controlword) noexcept;
 [[nodiscard]] std::string_view to_string(DriveState state) noexcept;

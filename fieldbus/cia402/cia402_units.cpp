@@ -45,7 +45,7 @@ CountScale::CountScale(const description::DriveDescription& drive)
 
 std::optional<std::int32_t> CountScale::counts(double angle_rad) const noexcept {
   const double exact = std::round(angle_rad * counts_per_rad_) + offset_counts_;
-  if (!(exact >= int32_low && exact <= int32_high)) return std::nullopt;  // NaN fails both
+  if (!(exact >= int32_low && exact <= int32_high)) return std::nullopt;  // NaN fails both comparisons
   return static_cast<std::int32_t>(exact);
 }
 

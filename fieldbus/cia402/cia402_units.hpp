@@ -2,8 +2,9 @@
 //
 //   counts = offset_counts + round(q · direction · counts_per_motor_revolution · gear_ratio / 2π)
 //
-// Rounded to the nearest count, halves away from zero: a round trip is off by at most half a count. Counts are int32;
-// for an angle out of their range there are no counts: it neither wraps nor saturates.
+// Counts are rounded to the nearest integer, halves away from zero, so an angle that is converted to counts and back is
+// off by at most half a count. Counts are int32. An angle whose counts don't fit int32 gives nullopt; it neither wraps
+// nor saturates.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +16,16 @@ namespace proxarm::fieldbus {
 
 class CountScale {
  public:
-  // Throws SetupError if a value is unusable, or if the joint's range doesn't fit int32.
+  // Throws SetupError if a value of the description is invalid, or if the counts of the joint's range don't fit int32.
   explicit CountScale(const description::DriveDescription& drive);
 
-  [[nodiscard]] std::optional<std::int32_t> counts(double angle_rad) const noexcept;  // nullopt: NaN or out of range
+  // nullopt: the angle is NaN or its counts don't fit int32.
+  [[nodiscard]] std::optional<std::int32_t> counts(double angle_rad) const noexcept;
   [[nodiscard]] double angle_rad(std::int32_t counts) const noexcept;
-  [[nodiscard]] double counts_per_rad() const noexcept { return counts_per_rad_; }  // signed like `direction`
-  // A size (window, speed) in counts, rounded up; nullopt if negative, not finite or too large.
+  // Has the sign of `direction`.
+  [[nodiscard]] double counts_per_rad() const noexcept { return counts_per_rad_; }
+  // Converts a size (a window or a speed) to counts, rounded up. Returns nullopt if the size is negative or not finite,
+  // or if its counts are too large.
   [[nodiscard]] std::optional<std::uint32_t> size_counts(double size_rad) const noexcept;
 
  private:
@@ -29,14 +33,15 @@ class CountScale {
   double offset_counts_;
 };
 
-// 60C2h: period = units · 10^exponent s, units 1..255.
+// The contents of 60C2h: period = units · 10^exponent s, with units 1..255.
 struct InterpolationPeriod {
   std::uint8_t units = 1;
   std::int8_t exponent = -3;
   friend bool operator==(const InterpolationPeriod&, const InterpolationPeriod&) = default;
 };
 
-// The one with the fewest units that is exactly `period_ns`; nullopt if there is none.
+// Returns the representation of exactly `period_ns` that has the fewest units; nullopt if the period has no such
+// representation.
 [[nodiscard]] std::optional<InterpolationPeriod> interpolation_period(std::int64_t period_ns) noexcept;
 
 }  // namespace proxarm::fieldbus

@@ -1,8 +1,9 @@
-// Interface of one axis' drive to the cycle: a CiA 402 drive on CAN (ServoDrive) or a drive on a Modbus line
+// The cycle's interface to the drive of one axis: a CiA 402 drive on CAN (ServoDrive) or a drive on a Modbus line
 // (ModbusDrive).
 //
-// A cycle: on_sync(); on_frame() for received frames; set_target_rad(); encode_rpdo(), send. These are noexcept and
-// allocate nothing. Angles are the joint's; for a linear axis, metres.
+// In each cycle, call in this order: on_sync(); on_frame() for each received frame; set_target_rad(); encode_rpdo(),
+// and send the frame. These functions are noexcept and allocate nothing. Angles are those of the joint in radians; for
+// a linear axis they are positions in metres.
 #pragma once
 
 #include <cstdint>
@@ -18,22 +19,23 @@ namespace proxarm::fieldbus {
 
 enum class DriveFault : std::uint8_t {
   none,
-  state_fault,          // statusword reports fault or fault reaction active while operation is requested
-  left_operation,       // the drive left operation enabled by itself (quick stop, disabled, ...)
-  emergency,            // an EMCY that isn't a warning (canopen_emcy.hpp)
-  heartbeat_lost,       // no heartbeat for drive_heartbeat_timeout_ms
-  restarted,            // boot-up message: the drive was reset and has lost its configuration
-  not_operational,      // an NMT command of another node took it out of operational
-  pdo_short,            // a TPDO shorter than its mapping
+  state_fault,     // the statusword reports fault or fault reaction active while operation is requested
+  left_operation,  // the drive left operation enabled by itself (quick stop, disabled, ...)
+  emergency,       // the drive sent an EMCY that isn't a warning (canopen_emcy.hpp)
+  heartbeat_lost,  // the drive sent no heartbeat for drive_heartbeat_timeout_ms
+  restarted,       // the drive sent a boot-up message: it was reset and has lost its configuration
+  // The drive's heartbeat shows another NMT state than operational, for example after an NMT command of another node.
+  not_operational,
+  pdo_short,            // a TPDO was shorter than its mapping
   not_remote,           // statusword bit 9 is 0 in operation: the drive is under local control
-  mode_changed,         // 6061h in the cell's `feedback` shows another mode in operation
-  two_nodes,            // two TPDOs at each SYNC: two drives with one node number
-  target_out_of_range,  // target not finite or beyond 32 bits; the previous one is kept
-  modbus_timeout,       // no answer for the description's stale_after_s
-  modbus_exception,     // the drive refuses a request with an exception code
-  modbus_closed,        // the connection was closed or the serial device is gone
-  modbus_wrong_unit,    // another unit answered
-  modbus_malformed,     // invalid answer: incomplete, another function, wrong checksum
+  mode_changed,         // 6061h (in the cell's `feedback`) shows another mode while the drive follows targets
+  two_nodes,            // two TPDOs came at each SYNC: two drives have one node number
+  target_out_of_range,  // the target isn't finite or doesn't fit 32 bits; the previous target is kept
+  modbus_timeout,       // the drive sent no answer for the description's stale_after_s
+  modbus_exception,     // the drive refused a request with an exception code
+  modbus_closed,        // the connection was closed, or the serial device is gone
+  modbus_wrong_unit,    // another unit than the drive answered
+  modbus_malformed,     // the answer is invalid: incomplete, of another function, or with a wrong checksum
 };
 
 class CyclicDrive {
@@ -42,37 +44,44 @@ class CyclicDrive {
 
   [[nodiscard]] virtual const description::DriveDescription& description() const noexcept = 0;
   virtual void request(DriveGoal goal) noexcept = 0;
-  // Begins a cycle: frames received before are no longer fresh.
+  // Begins a cycle. Frames received before no longer count as fresh.
   virtual void on_sync(std::int64_t now_ns) noexcept = 0;
-  // True if the frame was this drive's.
+  // True if this drive sent the frame.
   virtual bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept = 0;
-  // Sets a new target. False if it isn't taken: not following() yet, or fault target_out_of_range.
+  // Sets a new target. False if the target isn't taken: the drive isn't following() yet, or the target is out of range
+  // (fault target_out_of_range).
   virtual bool set_target_rad(double angle_rad) noexcept = 0;
-  // The frame of this cycle; false if none is to be sent.
+  // Writes the frame of this cycle to `frame`; false if no frame is to be sent.
   virtual bool encode_rpdo(CanFrame& frame) noexcept = 0;
 
-  [[nodiscard]] virtual bool fresh() const noexcept = 0;  // the feedback is as new as it can be
+  // True if the feedback is as recent as the bus allows.
+  [[nodiscard]] virtual bool fresh() const noexcept = 0;
   [[nodiscard]] virtual std::uint32_t cycles_without_tpdo() const noexcept = 0;
-  [[nodiscard]] virtual double feedback_period_s() const noexcept { return 0.0; }  // 0: it answers every cycle
+  // Period in which the drive answers; 0: it answers in every cycle.
+  [[nodiscard]] virtual double feedback_period_s() const noexcept { return 0.0; }
   [[nodiscard]] virtual DriveState state() const noexcept = 0;
-  [[nodiscard]] virtual bool following() const noexcept = 0;  // takes targets
+  // True if the drive takes targets.
+  [[nodiscard]] virtual bool following() const noexcept = 0;
   [[nodiscard]] virtual std::int32_t actual_counts() const noexcept = 0;
   [[nodiscard]] virtual double actual_rad() const noexcept = 0;
-  // Motor torque as a share of the rated torque (6077h), signed like the joint; nullopt: not reported.
+  // Returns the motor torque as a share of the rated torque (6077h), with the sign of the joint; nullopt if the drive
+  // doesn't report it.
   [[nodiscard]] virtual std::optional<double> torque_share() const noexcept { return std::nullopt; }
-  // Torque of the gear on the link, signed like the joint, in the latest answer; nullopt: not measured.
+  // Returns the torque that the gear exerts on the link in the latest answer, with the sign of the joint; nullopt if it
+  // isn't measured.
   [[nodiscard]] virtual std::optional<double> gear_torque_Nm() const noexcept { return std::nullopt; }
   [[nodiscard]] virtual std::int32_t target_counts() const noexcept = 0;
   [[nodiscard]] virtual double target_rad() const noexcept = 0;
-  [[nodiscard]] virtual DriveFault fault() const noexcept = 0;  // the first one
-  // After a reset: the next request for operation may find the drive in fault and then resets it.
+  [[nodiscard]] virtual DriveFault fault() const noexcept = 0;  // the first fault that was raised
+  // Must be called after a reset. If the next request for operation finds the drive in fault, that fault is reset.
   virtual void forget_fault() noexcept = 0;
-  // State and fault in words; not for the cycle.
+  // Returns state and fault as text. Not for the cycle.
   [[nodiscard]] virtual std::string describe() const = 0;
 
-  // All state that changes in a cycle.
+  // Archives all state that changes in a cycle.
   virtual void archive(StateArchive& state) noexcept = 0;
-  // Input of the last on_sync() that came without a frame; when read back, the next on_sync() gets it.
+  // Archives the input that the last on_sync() got from other sources than frames. When the archive is read back, the
+  // next on_sync() gets this input.
   virtual void archive_input(StateArchive& /*state*/) noexcept {}
 
  protected:

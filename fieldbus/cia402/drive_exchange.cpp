@@ -41,7 +41,7 @@ std::vector<SdoSequence> exchange(CanNetwork& network, Slots drives, const Frame
     }
     if (!taken) handler(bus, received);
   };
-  // No overall deadline: each exchange has its own.
+  // The pump has no deadline, because each exchange has its own timeouts.
   constexpr std::int64_t forever = std::numeric_limits<std::int64_t>::max();
   pump_frames(network, forever, on_frame, [&](std::int64_t now_ns) {
     std::int64_t wake_ns = forever;

@@ -1,4 +1,5 @@
-// The identifiers used of a drive, by its node, from CiA 301's predefined connection set.
+// The identifiers that a session uses for a drive. They follow from the node number by CiA 301's predefined connection
+// set.
 #pragma once
 
 #include <array>
@@ -11,7 +12,8 @@
 
 namespace proxarm::fieldbus {
 
-// Sent by the drive: TPDO1, EMCY, SDO answer, heartbeat; sent by the master: RPDO1, SDO request.
+// Returns four identifiers that the drive sends (TPDO1, EMCY, SDO answer, heartbeat) and two that the master sends
+// (RPDO1, SDO request).
 inline std::array<std::uint32_t, 6> drive_identifiers(std::uint8_t node) noexcept {
   return {pdo_id(PdoDirection::transmit, 1, node),
           emcy_id(node),

@@ -10,9 +10,11 @@ namespace {
 
 using Slots = std::span<const DriveSlot>;
 
-// Drives report their state every 50 ms (1017h); these times contain enough heartbeats to tell whether a drive started.
+// Times after which a drive counts as not started: after the first NMT start, and after each remedy. Drives report
+// their state every 50 ms (1017h), so these times contain enough heartbeats.
 constexpr std::int64_t looked_into_after_ns = 300'000'000, shows_within_ns = 200'000'000;
-constexpr std::int64_t signs_of_life_ns = 100'000'000;  // of the controller: five heartbeats before NMT start
+// How long the controller shows signs of life before NMT start: five heartbeats.
+constexpr std::int64_t signs_of_life_ns = 100'000'000;
 
 constexpr const char* how_to_start =
     "it took its configuration but doesn't start: look at its display or its error list (1003h)";
@@ -36,7 +38,8 @@ std::string name_of(const DriveSlot& slot) {
   return "drive of " + drive.joint + " (bus " + drive.bus + ", node " + std::to_string(drive.node) + ")";
 }
 
-// Some stacks log the end of an error (code 0) in 1003h:01 while another error persists.
+// Returns the error as text. Some stacks write the end of an error (code 0) to 1003h:01 while another error persists,
+// so the code may be 0.
 std::string text_of(const Emergency& error) {
   if (error.code != 0) return describe(error);
   return "an error (1001h:00 is " + hex_text(error.error_register, 2) + ")";
@@ -48,7 +51,7 @@ std::vector<DriveSlot> slots_of(const std::vector<HeldBack>& held) {
   return slots;
 }
 
-// Drives whose error register isn't 0.
+// Returns the drives that haven't started and whose error register isn't 0.
 std::vector<HeldBack> held_back(const Start& start, Slots drives) {
   std::vector<DriveSlot> waiting;
   std::copy_if(drives.begin(), drives.end(), std::back_inserter(waiting), std::not_fn(is_started));
@@ -73,7 +76,7 @@ void start_anew(const Start& start, Slots drives) {
   (void)wait_for_state(start.network, drives, start.handler, NmtState::operational, shows_within_ns);
 }
 
-// ---- Remedies. A drive that refuses a step isn't an error: the next remedy follows.
+// ---- Remedies. If a drive refuses a step of a remedy, that isn't an error: the next remedy follows.
 
 void reset_fault(const Start& start, Slots drives) {
   (void)exchange(start.network, drives, start.handler, [](const ServoDrive& drive) {
@@ -84,8 +87,8 @@ void reset_fault(const Start& start, Slots drives) {
   start_anew(start, drives);
 }
 
-// Sends SYNC and the controller's heartbeat on the drives' buses until all are operational after NMT start, or time is
-// up.
+// Sends SYNC and the controller's heartbeat on the drives' buses, and then NMT start. Ends when all drives are
+// operational or the time is up.
 void start_under_signs_of_life(const Start& start, Slots drives) {
   const DriveSettings& settings = drives.front().drive->settings();
   HeartbeatProducer heartbeat(settings.master_node, std::int64_t{settings.master_heartbeat_ms} * 1'000'000);
@@ -158,7 +161,8 @@ constexpr Means means[] = {{"a fault reset", reset_fault},
                            {"SYNC and heartbeat before NMT start", show_life},
                            {"NMT reset communication (82h)", reset_communication}};
 
-// Returns the remedies tried, for the error message.
+// Applies the remedies in turn and removes the drives that have started from `held`. Returns the names of the remedies
+// tried, for the error message.
 std::string help(const Start& start, std::vector<HeldBack>& held) {
   std::string tried;
   for (const HeldBack& drive : held) {

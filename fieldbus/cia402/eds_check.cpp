@@ -74,16 +74,16 @@ void check_step(const EdsFile& eds, const SdoStep& step) {
   }
 }
 
-// Default of an object that can't be written, if the file has one.
+// Returns the default of an object that can't be written; nullopt if the EDS has no default for it.
 std::optional<std::uint32_t> fixed_value(const EdsObject& object, std::uint8_t node) noexcept {
   if (object.default_offset) return *object.default_offset + node;
   return object.default_value;
 }
 
-// Throws unless the fixed value is one of the permitted ones.
+// Throws SetupError if the object's fixed value isn't one of the values that the step permits.
 void require_found(const EdsFile& eds, const SdoStep& step, std::uint8_t node) {
   const auto value = fixed_value(*eds.find(number_of(step.object)), node);
-  if (!value) return;  // known only when the drive is asked
+  if (!value) return;  // the value is only known when the drive is asked
   const auto is = [&](std::uint32_t fits) { return ((*value ^ fits) & step.mask) == 0; };
   if (is(step.value) || std::any_of(step.as_found.begin(), step.as_found.end(), is)) return;
   std::string expected;
@@ -94,7 +94,7 @@ void require_found(const EdsFile& eds, const SdoStep& step, std::uint8_t node) {
          expected + ": " + step.name);
 }
 
-// The effect of a missing or read-only optional object; empty: none.
+// Returns the effect of an optional object that is missing or read-only; empty if it has no effect.
 std::string loss_of(const EdsObject* there, const SdoStep& step, std::uint8_t node) {
   if (*step.lost == '\0') return "";
   if (there == nullptr) return "no " + to_string(step.object) + ": " + step.lost;
@@ -157,8 +157,8 @@ std::vector<SdoStep> steps_by_eds(const std::vector<SdoStep>& steps, const EdsFi
       step.value = *value;
       step.advice = "is another device set to this node, or is this another device's EDS?";
     }
-    // The upper half of the revision changes with the CANopen behaviour, the lower half with the firmware (CiA 301,
-    // 7.5.2.19). A file without a revision has 0.
+    // The upper half of the revision number changes with the CANopen behaviour, the lower half with the firmware (CiA
+    // 301, 7.5.2.19). An EDS without a revision has 0.
     if (const std::uint32_t major = eds.revision.value_or(0) & 0xFFFF0000U;
         major != 0 && step.object == ObjectAddress{0x1018, 3}) {
       step.kind = SdoStep::Kind::expect;
@@ -168,7 +168,8 @@ std::vector<SdoStep> steps_by_eds(const std::vector<SdoStep>& steps, const EdsFi
     }
     checked.push_back(step);
   }
-  constexpr std::uint32_t first_of_device = 0x200000;  // lower ones are communication objects, which the master sets
+  // Objects below this address are communication objects, which the master sets.
+  constexpr std::uint32_t first_of_device = 0x200000;
   for (const auto& [address, object] : eds.objects) {
     if (!object.value || !object.writable || !object.readable || object.bits < 8 || object.bits > 32) continue;
     if (address < first_of_device || is_set_by(checked, address)) continue;

@@ -15,13 +15,13 @@ constexpr std::uint8_t homing_mode = 6;
 constexpr std::int64_t ms = 1'000'000, poll_ns = 10 * ms, state_patience_ns = 5'000 * ms;
 constexpr std::uint16_t start_bit = 1U << 4, reached = 1U << 10, attained = 1U << 12, error = 1U << 13;
 
-// SDO exchanges with one drive, with the controller's heartbeat in between.
+// SDO exchanges with one drive. Meanwhile the controller's heartbeat is sent.
 class Conversation {
  public:
   Conversation(CanNetwork& network, const DriveSlot& slot, const FrameHandler& other)
       : network_(network), slot_(slot), other_(other) {}
 
-  // Returns the last value read. Throws SetupError.
+  // Executes the steps and returns the last value read. Throws SetupError.
   std::uint32_t run(std::vector<SdoStep> steps) {
     const description::DriveDescription& drive = slot_.drive->description();
     SdoSequence sequence(network_.bus(slot_.bus), drive.node, drive.bus, "drive of " + drive.joint, std::move(steps),
@@ -72,7 +72,7 @@ class Conversation {
   CanNetwork& network_;
   const DriveSlot& slot_;
   const FrameHandler& other_;
-  std::int64_t heartbeat_ns_ = -1;  // time of the next heartbeat; < 0: none
+  std::int64_t heartbeat_ns_ = -1;  // time of the next heartbeat; < 0: no heartbeat is sent
 };
 
 std::uint32_t size(const ServoDrive& drive, double size_rad) {
@@ -100,7 +100,7 @@ std::vector<SdoStep> homing_steps(const ServoDrive& drive) {
           sdo_write({0x6099, 2}, 4, size(drive, homing.slow_speed_rad_per_s), "speed towards the zero"),
           if_present(sdo_write({0x609A, 0}, 4, size(drive, homing.acceleration_rad_per_s2), "homing acceleration")),
           sdo_write({0x607C, 0}, 4, 0, "home offset"),
-          // An earlier homing is no longer valid.
+          // Deletes the mark of an earlier homing, which is no longer valid.
           sdo_write({description::homed_index, description::homed_subindex}, 4, 0, "configuration date")};
 }
 
@@ -132,7 +132,7 @@ class Homing {
 
   void command(std::uint32_t word) {
     SdoStep step = sdo_write(object_address(drive_.description().objects.controlword), 2, word, "controlword");
-    step.mask = 0;  // the value read back doesn't matter
+    step.mask = 0;  // any value read back is accepted
     talk_.run({step});
   }
 
@@ -207,7 +207,7 @@ void home(CanNetwork& network, const DriveSlot& slot, const std::function<bool()
   try {
     homing.run();
   } catch (const SetupError&) {
-    leave();  // a drive that doesn't answer stops when the heartbeat ends
+    leave();  // if the drive doesn't answer, it stops when the heartbeat ends
     throw;
   }
   leave();

@@ -7,13 +7,13 @@
 namespace proxarm::fieldbus {
 namespace {
 
-constexpr std::uint8_t words_pdo = 3;  // TPDO2 may be the enabling input's
+constexpr std::uint8_t words_pdo = 3;  // TPDO2 may carry the enabling input
 constexpr std::uint16_t words_every_ms = 5, heartbeat_every_ms = 10;
 constexpr std::uint8_t on_change = 255;
 
 std::vector<SdoStep> words_steps(const ServoDrive& drive) {
   std::vector<SdoStep> steps;
-  // CiA 301 doesn't allow heartbeat and life guarding together.
+  // CiA 301 doesn't allow a node to use heartbeat and life guarding together.
   if (drive.description().bring_up.stops_by != description::StopsBy::life_guarding) {
     steps.push_back(sdo_write({0x1017, 0}, 2, heartbeat_every_ms, "producer heartbeat time"));
   }
@@ -57,7 +57,7 @@ void SilenceWatch::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcep
   if (Emergency emergency; decode_emcy(frame, time_ns, node_, emergency)) {
     if (emergency.code == 0) return;
     if (emcy_ == 0) emcy_ = emergency.code;
-    // 8100h (a stack that misses SYNC) is no stop: the drive goes on, and its state tells when it stops.
+    // 8100h (the stack misses SYNC) is no sign of a stop: the drive keeps moving. Its state shows when it stops.
     constexpr std::uint16_t communication = 0x8100;
     if (emergency.code != communication) react(time_ns);
   } else if (frame.id == heartbeat_id(node_) && frame.length == 1) {

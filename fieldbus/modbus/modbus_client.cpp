@@ -38,7 +38,7 @@ class LibmodbusClient final : public ModbusClient {
  private:
   ModbusResult transact(const ModbusMessage& request, ModbusMessage& answer) noexcept override {
     if (!connected_ && !reconnect()) return ModbusResult::closed;
-    if (serial_) modbus_flush(context_.get());  // a late answer to an earlier request
+    if (serial_) modbus_flush(context_.get());  // drops a late answer to an earlier request
     modbus_set_slave(context_.get(), request.bytes[0]);
     if (modbus_send_raw_request(context_.get(), request.bytes.data(), static_cast<int>(request.size)) < 0) {
       return give_up();
@@ -47,7 +47,7 @@ class LibmodbusClient final : public ModbusClient {
     std::array<std::uint8_t, MODBUS_MAX_ADU_LENGTH> bytes{};
     const int received = modbus_receive_confirmation(context_.get(), bytes.data());
     if (received < 0) return give_up();
-    // RTU: libmodbus returns 0 if another unit answered.
+    // In RTU mode, libmodbus returns 0 if another unit answered.
     if (received == 0) return give_up(ModbusResult::wrong_unit);
     const int first = modbus_get_header_length(context_.get()) - 1, last = received - (serial_ ? 2 : 0);
     if (last - first < 1 || last - first > static_cast<int>(modbus_most_bytes)) {
@@ -58,7 +58,8 @@ class LibmodbusClient final : public ModbusClient {
     return ModbusResult::ok;
   }
 
-  // Reads back the request and its checksum, which precede the answer. A different byte is a collision on the line.
+  // Reads back the request and its checksum, which the adapter echoes before the answer. If a byte differs from the one
+  // sent, there was a collision on the line.
   bool swallow_echo(const ModbusMessage& request) noexcept {
     constexpr std::size_t checksum_bytes = 2;
     for (std::size_t i = 0; i < request.size + checksum_bytes; ++i) {
@@ -80,7 +81,7 @@ class LibmodbusClient final : public ModbusClient {
     return give_up(ModbusResult::closed);
   }
 
-  // Discards late bytes and the rest of a bad answer, so that they aren't taken for the next answer.
+  // Discards late bytes and the rest of a bad answer, so that they aren't taken for the next answer. Returns `result`.
   ModbusResult give_up(ModbusResult result) noexcept {
     if (serial_) {
       modbus_flush(context_.get());
@@ -168,7 +169,7 @@ std::unique_ptr<ModbusClient> open_modbus(const ModbusLineDescription& line, dou
                        .advice = "is the drive on, and its address in the cell file the drive's?"});
   };
   if (!context) throw fail(errno);
-  set_timeouts(*context, std::max(response_timeout_s, 0.2));  // for connecting
+  set_timeouts(*context, std::max(response_timeout_s, 0.2));  // the longer timeout is for connecting
   if (modbus_connect(context.get()) != 0) throw fail(errno);
   set_timeouts(*context, response_timeout_s);
   return std::make_unique<LibmodbusClient>(std::move(context), line, response_timeout_s);

@@ -118,7 +118,7 @@ std::size_t ModbusDrive::encode(const Setpoint& setpoint, std::int64_t now_ns, s
   return at;
 }
 
-// Reads the feedback and, if there is a command, writes it in the same exchange.
+// Reads the feedback. If there is a command, writes it in the same exchange.
 ModbusResult ModbusDrive::talk(ModbusClient& client, std::span<const std::uint16_t> command) noexcept {
   const std::uint8_t unit = description_.node;
   const std::span<std::uint16_t> values(read_.data(), static_cast<std::size_t>(registers_.feedback_count));
@@ -153,7 +153,8 @@ bool ModbusDrive::exchange(ModbusClient& client, std::int64_t now_ns, std::int64
   if (cycling_ && now_ns - setpoint_.time_ns > stale_ns_) return false;
   std::array<std::uint16_t, modbus_most_written> command{};
   std::size_t count = 0;
-  // A drive without a control word moves as soon as it is written to.
+  // A drive without a control word moves as soon as a position is written to it, so nothing is written while it shall
+  // stand.
   const bool writes = cycling_ && (has_control() || setpoint_.follow);
   if (writes) count = encode(setpoint_, now_ns, exchange_ns, command);
   const ModbusResult result = talk(client, {command.data(), count});
@@ -162,8 +163,9 @@ bool ModbusDrive::exchange(ModbusClient& client, std::int64_t now_ns, std::int64
   return true;
 }
 
-// A single late or corrupted answer is noise on the line, and a busy gateway (exception 6) asks for a repetition. Any
-// other exception, a closed connection or an answer of another unit is a fault at once.
+// Counts the answer's result. These results are tolerated until the last good answer is older than stale_after_s: a
+// late or corrupted answer (noise on the line), and exception 6 (a busy gateway that asks for a repetition). Any other
+// exception, a closed connection, or an answer of another unit is a fault at once.
 void ModbusDrive::note(ModbusResult result, int exception, std::int64_t now_ns) noexcept {
   if (result == ModbusResult::ok) {
     const double interval_s = 1e-9 * static_cast<double>(now_ns - last_answer_ns_);
@@ -228,7 +230,7 @@ void ModbusDrive::start_up(ModbusClient& client, std::int64_t now_ns) {
                       .expected = "an answer",
                       .advice = "compare unit, baud rate and registers with " + registers_.file.string()});
   };
-  // Repeats the request while the gateway is busy.
+  // Repeats the request up to ten times while the gateway is busy.
   const auto asked = [&client](const auto& request) {
     ModbusResult result = request();
     for (int again = 0; again < 10 && result == ModbusResult::exception && client.exception() == modbus_busy; ++again) {

@@ -1,16 +1,19 @@
-// One drive on a Modbus line: its interface to the cycle, and the worker thread's part, which sends commands and
-// evaluates the answers.
+// One drive on a Modbus line. The cycle uses it through CyclicDrive; the worker thread sends its commands and evaluates
+// its answers.
 //
-// The cycle runs with period T. The line's exchanges have period P, several times T and not synchronised with the
-// cycle. The worker resamples: setpoint k was meant for t_k + 2T (when a drive on CAN would reach it), and a command
-// sent at t is reached one exchange later, so
-//   counts = target + v (t + P − (t_k + 2T)),  v = (target(k) − target(k−1))/T,
-// extrapolated by at most two exchanges and clamped to the joint's range. The commanded speed |counts − last counts|/P
-// lets the drive arrive just when the next command comes.
+// The cycle runs with period T. Exchanges on the line have the period P, which is several times T and isn't
+// synchronised with the cycle. The worker therefore resamples the setpoints:
+// 1. Setpoint k, computed at t_k, was meant to be reached at t_k + 2T, when a drive on CAN would reach it.
+// 2. A command that is sent at time t is reached one exchange later, at t + P.
+// 3. So the setpoint is extrapolated from t_k + 2T to t + P:
+//   counts = target + v (t + P − (t_k + 2T)),  v = (target(k) − target(k−1))/T
+// The extrapolation is limited to two exchanges, and counts are clamped to the joint's range. The commanded speed
+// |counts − last counts|/P makes the drive arrive when the next command comes.
 //
-// If the setpoint is older than stale_after_s, the cycle has stopped: the worker sends nothing more, and the drive
-// stops by its communication timeout. Two threads: the cycle's, which uses the functions of CyclicDrive, and the
-// worker's.
+// If the setpoint is older than stale_after_s, the cycle has stopped. The worker then sends nothing more, and the drive
+// stops by its communication timeout.
+//
+// Two threads use this class: the cycle's thread, through the functions of CyclicDrive, and the worker thread.
 #pragma once
 
 #include <array>
@@ -27,20 +30,20 @@ namespace proxarm::fieldbus {
 
 class ModbusDrive final : public CyclicDrive {
  public:
-  // `period_ns`: the cycle's. Throws SetupError if the drive's values don't fit into its registers.
+  // `period_ns` is the period of the cycle. Throws SetupError if the drive's values don't fit into its registers.
   ModbusDrive(const description::DriveDescription& drive, const description::ModbusDriveDescription& registers,
               std::int64_t period_ns);
 
-  // ---- worker thread ----
-  // One exchange, begun at now_ns; exchange_ns is the time between two exchanges with this drive. False if nothing was
-  // sent because the cycle has stopped.
+  // Makes one exchange, which begins at now_ns. exchange_ns is the time between two exchanges with this drive. False if
+  // nothing was sent because the cycle has stopped.
   bool exchange(ModbusClient& client, std::int64_t now_ns, std::int64_t exchange_ns) noexcept;
-  // Before the cycle: writes the settings and reads them back, reads the position. Throws SetupError, also if that
-  // position is out of the joint's range but would be within it in the other word order.
+  // Must be called before the cycle. Writes the settings and reads them back, then reads the position. Throws
+  // SetupError if that fails. Also throws if the position is out of the joint's range but would be within the range in
+  // the other word order.
   void start_up(ModbusClient& client, std::int64_t now_ns);
-  // True if the position read at start proves that the file's word order is the drive's: in the other order it would be
-  // out of range. A position with two equal words, such as 0, proves nothing. Later positions can't prove it either:
-  // written and read values would both be swapped.
+  // True if the position that was read at start proves the file's word order to be the drive's. It does if the position
+  // would be out of range in the other word order. A position with two equal words, such as 0, proves nothing. Later
+  // positions prove nothing either, because a wrong order would swap the words of written and read values alike.
   [[nodiscard]] bool word_order_shown() const noexcept { return word_order_shown_; }
 
   // ---- cycle thread ----
@@ -53,7 +56,7 @@ class ModbusDrive final : public CyclicDrive {
   bool encode_rpdo(CanFrame&) noexcept override { return false; }
 
   [[nodiscard]] bool fresh() const noexcept override { return fresh_; }
-  // Always 0: a drive that is silent for stale_after_s has the fault modbus_timeout instead.
+  // Returns 0. A drive that is silent for stale_after_s gets the fault modbus_timeout instead.
   [[nodiscard]] std::uint32_t cycles_without_tpdo() const noexcept override { return 0; }
   [[nodiscard]] double feedback_period_s() const noexcept override {
     return feedback_.rate_Hz > 0.0 ? 1.0 / feedback_.rate_Hz : registers_.stale_after_s;
@@ -71,25 +74,25 @@ class ModbusDrive final : public CyclicDrive {
     state(feedback_, goal_, state_, fault_, now_ns_, target_counts_, previous_target_, fresh_, following_);
   }
   void archive_input(StateArchive& state) noexcept override;
-  // Mean over the last answered exchanges, 1/s; 0 before the first.
+  // Returns the mean rate of the last answered exchanges in 1/s; 0 before the first answered exchange.
   [[nodiscard]] double achieved_rate_Hz() const noexcept { return feedback_.rate_Hz; }
 
  private:
-  // From the cycle to the worker.
+  // What the cycle passes to the worker.
   struct Setpoint {
-    std::int64_t time_ns = 0;  // t_k
+    std::int64_t time_ns = 0;  // time t_k at which the setpoint was computed
     double counts = 0.0;
     double counts_per_s = 0.0;
-    bool drive_it = false;  // the power stage shall be on
-    bool follow = false;    // go to `counts`; false: stay at the present position
+    bool drive_it = false;  // true: the power stage shall be on
+    bool follow = false;    // true: the drive shall go to `counts`; false: it shall stay where it is
   };
-  // From the worker to the cycle.
+  // What the worker passes to the cycle.
   struct Feedback {
     std::int64_t time_ns = 0;
     std::int32_t position_counts = 0;
     std::uint32_t status = 0;
     DriveFault fault = DriveFault::none;
-    DriveFault noise = DriveFault::none;  // defect of the latest answer while it is still tolerated
+    DriveFault noise = DriveFault::none;  // defect of the latest answer, as long as it is tolerated
     int exception = 0;
     double rate_Hz = 0.0;
   };

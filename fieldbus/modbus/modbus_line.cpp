@@ -8,7 +8,7 @@ namespace proxarm::fieldbus {
 
 namespace {
 
-constexpr double tcp_exchange_s = 1e-3;  // for a device with a network connection of its own
+constexpr double tcp_exchange_s = 1e-3;  // assumed for a device with its own network connection
 
 double rtu_s(double characters, double silences, const description::ModbusLineDescription& line) noexcept {
   const double character_bits = 1 + 8 + (line.parity == "none" ? 0 : 1) + line.stop_bits;
@@ -25,8 +25,10 @@ double modbus_rtu_read_s(int registers, const description::ModbusLineDescription
 double modbus_rtu_exchange_s(const description::ModbusDriveDescription& drive,
                              const description::ModbusLineDescription& line) noexcept {
   const int written = 2 * drive.command_count(), read = 2 * drive.feedback_count;
-  // Bytes with checksums. Function 23: request 11 + written + 2, answer 3 + read + 2. Function 16: 9 + written, answer
-  // 8. Function 3: 8, answer 5 + read.
+  // Number of characters with checksums, where `written` and `read` count data bytes:
+  // - function 23: request 11 + written + 2, answer 3 + read + 2
+  // - function 16: request 9 + written, answer 8
+  // - function 3: request 8, answer 5 + read
   const double characters = drive.function_23 ? 13.0 + written + 5.0 + read : 9.0 + written + 8.0 + 8.0 + 5.0 + read;
   const double silences = drive.function_23 ? 2.0 : 4.0;
   return rtu_s(characters, silences, line);
@@ -77,7 +79,7 @@ std::int64_t ModbusLine::step(std::int64_t now_ns) noexcept {
     sensor_->exchange(*client_, now_ns);
   }
   turn_ = (turn_ + 1) % devices;
-  // If the line is slower than wanted, the next exchange starts at once; missed ones aren't made up for.
+  // If the line is slower than the wanted rate, the next exchange starts at once. Missed exchanges aren't made up for.
   next_ns_ = std::max(next_ns_ + interval_ns_ / static_cast<std::int64_t>(devices), now_ns);
   return next_ns_;
 }

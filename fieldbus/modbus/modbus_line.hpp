@@ -1,5 +1,5 @@
-// The worker of a Modbus line: exchanges with each of its drives in turn, at the rate they ask for or as fast as the
-// line allows.
+// The worker of a Modbus line. It makes exchanges with the line's drives and its sensor in turn, at the rate that the
+// devices ask for, or as fast as the line allows if that is slower.
 //
 // On a real line, run() has its own thread. In simulation, the owner of the virtual clock calls step() at the times
 // that step() returns.
@@ -17,19 +17,22 @@
 
 namespace proxarm::fieldbus {
 
-// Time on the wire of one exchange over a serial line, in s: request and answer, 11 bits per character (10 without
-// parity and with one stop bit), and after each a silence of 3.5 characters, at least 1.75 ms above 19,200 baud.
+// Returns how long one exchange with a drive takes on a serial line, in s. It adds up request and answer with 11 bits
+// per character (10 without parity and with one stop bit). Each message is followed by a silence of 3.5 characters,
+// which lasts at least 1.75 ms above 19,200 baud.
 [[nodiscard]] double modbus_rtu_exchange_s(const description::ModbusDriveDescription& drive,
                                            const description::ModbusLineDescription& line) noexcept;
-// The same for reading `registers` with function 3.
+// Returns how long reading `registers` registers with function 3 takes on a serial line, in s.
 [[nodiscard]] double modbus_rtu_read_s(int registers, const description::ModbusLineDescription& line) noexcept;
-// Expected exchanges per second with each of `drives` units: the rate the drive asks for, or what the line can carry.
+// Returns the expected number of exchanges per second with each of `drives` units: the drive's wanted rate, or the rate
+// that the line can carry if that is lower.
 [[nodiscard]] double modbus_expected_rate_Hz(const description::ModbusDriveDescription& drive,
                                              const description::ModbusLineDescription& line, int drives) noexcept;
 
 class ModbusLine {
  public:
-  // Drives and sensor (null if the line has none) must outlive the line. Line and client are already open.
+  // Precondition: line and client are already open. The drives and the sensor (nullptr if the line has no sensor) must
+  // outlive the ModbusLine.
   ModbusLine(const description::ModbusLineDescription& line, std::unique_ptr<ModbusClient> client,
              std::vector<ModbusDrive*> drives, ModbusSensor* sensor = nullptr);
   ModbusLine(const ModbusLine&) = delete;
@@ -39,13 +42,14 @@ class ModbusLine {
   [[nodiscard]] const description::ModbusLineDescription& description() const noexcept { return line_; }
   [[nodiscard]] const std::vector<ModbusDrive*>& drives() const noexcept { return drives_; }
 
-  // Writes the settings and reads them back, reads the positions. Throws SetupError.
+  // Starts up all drives and the sensor: writes the settings and reads them back, and reads the positions. Throws
+  // SetupError.
   void start_up(std::int64_t now_ns);
-  // Longest time of an exchange on the wire, s.
+  // Returns the duration of the longest exchange on the wire in s.
   [[nodiscard]] double exchange_s() const noexcept;
-  // Exchanges with the drive or sensor whose turn it is; returns the time of the next exchange.
+  // Makes an exchange with the drive or sensor whose turn it is. Returns the time of the next exchange.
   std::int64_t step(std::int64_t now_ns) noexcept;
-  // Starts the worker thread: step() on CLOCK_MONOTONIC until stop().
+  // Starts the worker thread, which calls step() on CLOCK_MONOTONIC until stop().
   void start();
   void stop() noexcept;
 
@@ -56,7 +60,7 @@ class ModbusLine {
   std::unique_ptr<ModbusClient> client_;
   std::vector<ModbusDrive*> drives_;
   ModbusSensor* sensor_;
-  std::int64_t interval_ns_;  // between exchanges with the same drive
+  std::int64_t interval_ns_;  // time between two exchanges with the same device
   std::int64_t next_ns_ = 0;
   std::size_t turn_ = 0;
   std::atomic<bool> stop_{false};

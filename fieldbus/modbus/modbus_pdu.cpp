@@ -66,7 +66,7 @@ ModbusResult decode_answer(std::span<const std::uint8_t> request, std::span<cons
   }
   if (answer[1] != function) return ModbusResult::malformed;
   if (function == static_cast<std::uint8_t>(ModbusFunction::write_registers)) {
-    // The answer repeats the address and the count.
+    // The answer to a write repeats the request's address and count.
     return answer.size() == 6 && std::equal(answer.begin(), answer.end(), request.begin()) ? ModbusResult::ok
                                                                                            : ModbusResult::malformed;
   }

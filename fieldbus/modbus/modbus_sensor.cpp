@@ -90,7 +90,8 @@ bool ModbusSensor::poll(std::int64_t now_ns, CanFrame& frame) noexcept {
 
 void ModbusSensor::archive_input(StateArchive& state) noexcept {
   bool took = took_;
-  Sample sample = state.reading() ? read_ : taken_;  // both have the frame's id and length, which aren't archived
+  // read_ and taken_ have the same identifier and length, which aren't archived
+  Sample sample = state.reading() ? read_ : taken_;
   state(took, sample);
   if (state.reading() && took) samples_.write(sample);
 }

@@ -1,9 +1,9 @@
-// A force sensor on a Modbus line, known only by its description file. The worker reads the registers of a sample with
-// function 3 at the file's rate. The sample is decoded like that of any described sensor (described_sensor.hpp), two
-// bytes per register, high byte first.
+// A force sensor on a Modbus line that is known only by its description file. The line's worker reads the registers of
+// a sample with function 3 at the file's rate. The sample is decoded like that of a described sensor on CAN
+// (described_sensor.hpp), with two bytes per register, high byte first.
 //
-// Two threads: the line's worker, which exchanges, and the cycle, which uses the functions of ForceSensor and never
-// waits. A failed exchange counts as a missing sample.
+// Two threads use this class: the line's worker, which makes the exchanges, and the cycle, which uses the functions of
+// ForceSensor and never waits. A failed exchange counts as a missing sample.
 #pragma once
 
 #include <atomic>
@@ -16,11 +16,10 @@ namespace proxarm::fieldbus {
 
 class ModbusSensor final : public ForceSensor {
  public:
-  // Throws SetupError if the file isn't of a Modbus sensor, or the unit isn't 1 to 247.
+  // Throws SetupError if the description file isn't that of a Modbus sensor, or if the unit isn't 1 to 247.
   ModbusSensor(const description::SensorDescription& sensor, std::uint32_t unit, const std::string& line);
 
-  // ---- worker thread ----
-  // Before the cycle: checks that the sensor answers. Throws SetupError.
+  // Must be called before the cycle. Throws SetupError if the sensor doesn't answer.
   void start_up(ModbusClient& client, std::int64_t now_ns);
   void exchange(ModbusClient& client, std::int64_t now_ns) noexcept;
   [[nodiscard]] double rate_Hz() const noexcept { return protocol_.rate_Hz; }
@@ -29,7 +28,7 @@ class ModbusSensor final : public ForceSensor {
 
   // ---- cycle thread ----
   [[nodiscard]] std::vector<std::uint32_t> wanted_ids() const override { return {}; }
-  void start(CanNetwork&, std::size_t, const FrameHandler&) override {}  // start_up() does it
+  void start(CanNetwork&, std::size_t, const FrameHandler&) override {}  // start_up() starts the sensor
   [[nodiscard]] std::string identity() const override;
   bool poll(std::int64_t now_ns, CanFrame& frame) noexcept override;
   bool on_frame(const CanFrame&, std::int64_t) noexcept override { return false; }

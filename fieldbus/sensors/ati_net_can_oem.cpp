@@ -5,8 +5,8 @@
 namespace proxarm::fieldbus {
 namespace {
 
-constexpr std::uint8_t op_gauges_even = 0x0;  // status, SG0, SG2, SG4; also the request
-constexpr std::uint8_t op_gauges_odd = 0x1;   // SG1, SG3, SG5
+constexpr std::uint8_t op_gauges_even = 0x0;  // answer with status, SG0, SG2, SG4; also the request for a sample
+constexpr std::uint8_t op_gauges_odd = 0x1;   // answer with SG1, SG3, SG5
 
 }  // namespace
 
@@ -37,7 +37,7 @@ void AtiNetCanOem::drop_half() noexcept {
 bool AtiNetCanOem::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept {
   if (frame.id >> 4 != settings_.base_id || frame.extended || frame.remote || frame.error) return false;
   const std::uint8_t op = frame.id & 0xF;
-  if (op > op_gauges_odd) return true;  // answers a request of the set-up
+  if (op > op_gauges_odd) return true;  // this frame answers a request of the set-up
   if (frame.length != (op == op_gauges_even ? 8 : 6)) {
     ++wrong_lengths_;
     return true;
@@ -47,7 +47,7 @@ bool AtiNetCanOem::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcep
     return true;
   }
   if (op == op_gauges_even) {
-    drop_half();  // its op 1 was lost
+    drop_half();  // op 1 of the sample before was lost
     half_ns_ = time_ns;
     half_status_ = read_u16_be(&frame.data[0]);
     for (std::size_t i = 0; i < 3; ++i) half_gauges_[2 * i] = read_i16_be(&frame.data[2 + 2 * i]);

@@ -1,4 +1,4 @@
-// Requests to an ATI Net CAN OEM before the cycle, and its status word in words.
+// Requests to an ATI Net CAN OEM before the cycle, and its status word as text.
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -22,7 +22,7 @@ struct Unit {
   double si;
 };
 
-constexpr double pound_force_N = 4.4482216152605;  // exact, by the definition of pound and standard gravity
+constexpr double pound_force_N = 4.4482216152605;  // exact, by the definitions of the pound and of standard gravity
 constexpr double inch_m = 0.0254;
 constexpr double standard_gravity = 9.80665;
 
@@ -51,7 +51,7 @@ struct StatusBit {
   const char* text;
 };
 
-// Bit 15 is set whenever another bit is.
+// Bits of the status word. Bit 15 is set whenever another bit is set.
 constexpr StatusBit status_bits[] = {
     {0, "watchdog reset"},
     {1, "excitation voltage (DAC/ADC check) too high"},
@@ -71,8 +71,8 @@ constexpr StatusBit status_bits[] = {
     {15, "error"},
 };
 
-// True for a single-frame answer to another op: it belongs to an earlier request that was given up. Taken for an answer
-// to the present one, it would be stored as part of the calibration.
+// True if op `answered` is a single-frame answer to another request than `asked`, so it belongs to an earlier request
+// that was given up. If such a frame were accepted, it would be stored as part of the calibration.
 bool is_of_another_request(std::uint32_t answered, std::uint8_t asked) noexcept {
   const bool is_single =
       answered == op_serial || answered == op_counts || answered == op_units || answered == op_firmware;
@@ -83,9 +83,12 @@ std::string timeout_text(const AtiNetCanOemSettings& settings) {
   return std::to_string(settings.answer_timeout_ns / 1'000'000) + " ms";
 }
 
-// Gaussian elimination with complete pivoting on rows scaled to 1 (force and torque rows differ in unit). The entries
-// are floats with a relative error of up to 2⁻²⁴. Six eliminated columns add at most six such errors of the largest
-// entry (1) to the remainder, so a pivot below 6·2⁻²⁴ can't be distinguished from zero.
+// True if the matrix can't be distinguished from a singular one. Method: Gaussian elimination with complete pivoting,
+// after scaling each row to a largest entry of 1, because force and torque rows differ in unit. The threshold follows
+// in three steps:
+// 1. The entries are floats with a relative error of up to 2⁻²⁴.
+// 2. Eliminating six columns adds at most six such errors of the largest entry (1) to the remainder.
+// 3. So a pivot below 6·2⁻²⁴ can't be distinguished from zero.
 bool is_singular(std::array<std::array<double, 6>, 6> m) noexcept {
   for (auto& row : m) {
     double largest = 0.0;
@@ -121,7 +124,8 @@ AtiNetCanOem::AtiNetCanOem(AtiNetCanOemSettings settings) : settings_(std::move(
                       .found = hex_text(settings_.base_id, 2),
                       .expected = "0x00 to 0x7F (the identifiers on the wire are 16 times that, plus 0 to 15)"});
   }
-  // Below 0x080, a poll would have a higher priority than SYNC; base id 0 would send NMT commands.
+  // If the base id were below 0x08, a poll would have a higher priority than SYNC. Base id 0x08 would put a poll on
+  // SYNC's identifier, and base id 0 would send NMT commands.
   if (settings_.base_id < 0x08 + 1) {
     throw SetupError(
         {.bus = settings_.bus_name,
@@ -175,8 +179,8 @@ std::vector<CanFrame> AtiNetCanOem::ask(CanNetwork& network, std::size_t bus, co
         return;
       }
       if (is_of_another_request(frame.id & 0xFU, op)) late = true;
-      // In order, and all of this request: a late answer to an earlier one starts with a lower op or has another
-      // length.
+      // The frames must come in order and all belong to this request. A late answer to an earlier request starts with a
+      // lower op or has another length.
       if (received.time_ns < sent_ns || answer.size() >= frames || frame.id != id(op) + answer.size()) return;
       if (frame.length != bytes) {
         trouble = "an answer of " + std::to_string(frame.length) + " bytes instead of " + std::to_string(bytes);
@@ -184,7 +188,8 @@ std::vector<CanFrame> AtiNetCanOem::ask(CanNetwork& network, std::size_t bus, co
       }
       answer.push_back(frame);
     };
-    // After a failed attempt the whole timeout passes, so that its late answer isn't taken for the next one's.
+    // After a failed attempt, wait until the whole timeout has passed: otherwise a late answer to this attempt could be
+    // taken for the answer to the next attempt.
     if (pump_frames(network, deadline_ns, handler,
                     [&](std::int64_t) { return late || answer.size() == frames ? pump_done : deadline_ns; }) &&
         !late) {

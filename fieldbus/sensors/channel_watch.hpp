@@ -1,11 +1,16 @@
-// Detects a stuck channel of a force sensor: it repeats one reading while other channels change.
+// Detects a stuck channel of a force sensor: a channel that repeats one reading while other channels change.
 //
-// The first 200 samples, read while the arm stands, decide which channels can be judged. With x a channel's reading in
-// counts, half the mean square of x(k) − x(k−1) is the variance of its noise, whatever its drift. From half a count
-// squared on, the noise before rounding has a standard deviation of at least 0.5 counts (rounding adds 1/12; the
-// estimate is right to 50 % at five sigmas). A sample then repeats the last one with a probability of at most 0.52, and
-// a hundred in a row with 0.52¹⁰⁰ = 4e-29: never, in six channels at 1 kHz for a century (2e13 samples). A quieter
-// channel isn't judged. Samples that repeat in all channels don't count; ForceSample::repeats counts them.
+// How a channel is judged (x(k) is its reading in sample k, in counts):
+// 1. The first 200 samples are read while the arm stands. They give an estimate of the variance of the channel's noise:
+//    half the mean square of x(k) − x(k−1). A drift of the channel doesn't affect this estimate.
+// 2. A channel is judged only if the estimate is at least 0.5 counts². Rounding contributes 1/12 counts² to it, and the
+//    estimate is accurate to 50 % (five standard deviations). So the noise before rounding has a standard deviation of
+//    at least 0.5 counts.
+// 3. With this noise, a sample repeats the reading of the sample before with a probability of at most 0.52.
+// 4. A hundred repetitions in a row have a probability of 0.52¹⁰⁰ = 4e-29. Six channels at 1 kHz give 2e13 samples in a
+//    century, so a working channel never repeats a reading a hundred times.
+// A channel with less noise isn't judged. A sample in which no channel has changed doesn't count here;
+// ForceSample::repeats counts such samples.
 #pragma once
 
 #include <array>
@@ -20,7 +25,7 @@ class ChannelWatch {
  public:
   static constexpr std::uint32_t most_repeats = 100;
 
-  // Adds a sample, in counts; at most six channels.
+  // Adds a sample. Unit of `counts`: counts of each channel; at most six channels are used.
   void add(std::span<const double> counts) noexcept {
     State& s = state_;
     const std::size_t n = counts.size() < s.last.size() ? counts.size() : s.last.size();
@@ -36,7 +41,8 @@ class ChannelWatch {
     if (s.learned <= learning) s.learned += 1.0;
   }
 
-  // How often the longest stuck channel, of those that can be judged, has repeated its reading.
+  // Returns how often the channel that has been stuck longest has repeated its reading. Only channels that can be
+  // judged are considered.
   [[nodiscard]] std::uint32_t repeats() const noexcept {
     if (state_.learned <= learning) return 0;
     double most = 0.0;
@@ -54,8 +60,8 @@ class ChannelWatch {
   struct State {
     std::array<double, 6> last{};
     std::array<double, 6> repeats{};
-    std::array<double, 6> squares{};  // sums of squared steps between samples
-    double learned = 0.0;             // samples so far
+    std::array<double, 6> squares{};  // sums of the squared differences between consecutive samples
+    double learned = 0.0;             // number of samples so far
   };
   State state_;
 };

@@ -86,7 +86,8 @@ bool DescribedSensor::fits(std::size_t slot, const CanFrame& frame) const noexce
          std::equal(wanted.head.begin(), wanted.head.begin() + wanted.head_bytes, frame.data.begin());
 }
 
-// True for a frame received twice in a row. If the next frame would look the same, only a header distinguishes them.
+// True if the frame repeats the frame before it. If the next expected frame could have the same content, a repetition
+// can only be recognised by a header.
 bool DescribedSensor::repeats_last(const CanFrame& frame) const noexcept {
   if (next_ == 0) return false;
   const Slot& last = slots_[next_ - 1];
@@ -99,8 +100,8 @@ bool DescribedSensor::in_time(std::int64_t time_ns) const noexcept {
   return polled_ && time_ns >= older_poll_ns_ && !answered();
 }
 
-// In a polled sensor, a sample with a poll between its frames must take less than half a period: frames of different
-// samples are a whole period apart.
+// True if a frame at time_ns can belong to the sample that has begun. If a poll came between the frames of a polled
+// sensor, they must be at most half a period apart, because frames of different samples are a whole period apart.
 bool DescribedSensor::came_together(std::int64_t time_ns) const noexcept {
   const std::int64_t took_ns = time_ns - begun_ns_;
   if (took_ns < 0 || took_ns > together_ns_) return false;
@@ -112,7 +113,8 @@ bool DescribedSensor::on_frame(const CanFrame& frame, std::int64_t time_ns) noex
   if (frame.error || frame.remote || frame.extended != protocol_.extended) return false;
   const bool known = std::any_of(slots_.begin(), slots_.end(), [&](const Slot& slot) { return slot.id == frame.id; });
   if (!known) return false;
-  // Before repeats_last(): at rest, the next sample's first frame can be equal to the bit.
+  // This check comes before repeats_last(): when the arm is at rest, the first frame of the next sample can equal the
+  // last frame received to the bit.
   if (next_ > 0 && !came_together(time_ns)) tear();
   if (frame.fd != protocol_.fd || !in_time(time_ns) || repeats_last(frame)) {
     ++counts_.dropped;
@@ -175,13 +177,14 @@ bool DescribedSensor::checksum_is_right() const noexcept {
   return (checksum_of(rule, bytes) & checksum_.mask) == bits_of(checksum_);
 }
 
-// A step of more than half the counter's range is a step back: a late, older sample.
+// True if the sample's counter has increased. A step of at least half the counter's range counts as a step back: the
+// sample is an older one that came late.
 bool DescribedSensor::counter_moved() noexcept {
   if (!protocol_.counter) return true;
   const std::uint64_t count = bits_of(counter_);
   const std::uint64_t step = (count - last_count_) & counter_.mask;
   if (counted_ && (step == 0 || step >= counter_.sign)) {
-    // A restarted sensor counts from any number, so the second older sample in a row is accepted.
+    // A restarted sensor may count from any number. So a second sample in a row whose counter steps back is accepted.
     counted_ = step == 0;
     ++counts_.repeated;
     if (step == 0) ++latest_.repeats;
@@ -202,7 +205,7 @@ void DescribedSensor::decode(std::int64_t time_ns) noexcept {
     same = same && number == numbers_[i];
     numbers_[i] = number;
     values_[i] = channel.scale * number + channel.offset;
-    // Also true for NaN.
+    // The negated comparison is also true for NaN.
     if (!(number > channel.lowest && number < channel.highest)) latest_.saturated = true;
     if (identity_matrix_ && !(std::abs(values_[i]) <= range_[i])) latest_.saturated = true;
   }

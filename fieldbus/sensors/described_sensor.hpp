@@ -1,10 +1,12 @@
 // A force/torque sensor known only by its description file (models/description/sensor_protocol.hpp). The file is
-// converted to tables once; the cycle doesn't search or allocate, and accepts any bytes.
+// converted to tables once. The cycle doesn't search or allocate, and accepts any bytes.
 //
-// A sample is complete when all its frames have come in order, within `together_s` of the first, with a right checksum
-// and an increased counter. Parts of two samples are never mixed: without counter and checksum, the sample after an
-// incomplete one is dropped too, since its order isn't certain. Frames of a polled sensor must come after the poll, and
-// one sample answers it.
+// A sample is complete when all its frames have come in order, within `together_s` of the first frame, with a right
+// checksum and an increased counter. Parts of two samples are never mixed. If the protocol has neither counter nor
+// checksum, the sample after an incomplete one is dropped too, because the order of its frames isn't certain.
+//
+// Frames of a polled sensor must come after one of the last two polls. A sample that answers the older poll is late.
+// After a sample that isn't late, all frames until the next poll are dropped.
 #pragma once
 
 #include <array>
@@ -19,29 +21,29 @@
 namespace proxarm::fieldbus {
 
 struct DescribedSensorSettings {
-  std::string bus_name;  // for messages
+  std::string bus_name;  // appears in messages
   std::uint32_t base_id = 0;
   std::int64_t answer_timeout_ns = 100'000'000;
-  int attempts = 10;                  // at start, so a booting sensor has a second
-  std::int64_t pause_ns = 2'000'000;  // after each command
-  // Streaming: frames that were on the wire earlier than this before their cycle are dropped.
+  int attempts = 10;                  // attempts at start, so a booting sensor has a second
+  std::int64_t pause_ns = 2'000'000;  // pause after each command
+  // For streaming sensors: a frame is dropped if it was on the wire longer than this before the last call of poll().
   std::int64_t oldest_sample_ns = 20'000'000;
 };
 
-// Errors since the start; counts of frames unless it says samples.
+// Errors since the start. Each member counts frames unless its comment says samples.
 struct DescribedSensorCounts {
   std::uint64_t wrong_lengths = 0;
-  std::uint64_t dropped = 0;        // repeated, out of order, late, or before the poll
-  std::uint64_t late = 0;           // samples that answer an older poll
-  std::uint64_t incomplete = 0;     // samples without a frame, or of uncertain order
-  std::uint64_t bad_checksums = 0;  // samples
+  std::uint64_t dropped = 0;        // frames that were repeated, out of order, late, or sent before the poll
+  std::uint64_t late = 0;           // samples that answer the poll before the last one
+  std::uint64_t incomplete = 0;     // samples with a missing frame, or with frames in uncertain order
+  std::uint64_t bad_checksums = 0;  // samples with a wrong checksum
   std::uint64_t repeated = 0;       // samples whose counter didn't increase
-  std::uint64_t lost = 0;           // samples missing between counters
+  std::uint64_t lost = 0;           // samples that must be missing, because the counter skipped numbers
 };
 
 class DescribedSensor final : public ForceSensor {
  public:
-  // Throws SetupError for a base id that the description doesn't allow, or for identifiers of NMT or SYNC.
+  // Throws SetupError if the description doesn't allow the base id, or if an identifier is that of NMT or SYNC.
   DescribedSensor(const description::SensorDescription& sensor, DescribedSensorSettings settings);
 
   [[nodiscard]] std::vector<std::uint32_t> wanted_ids() const override;
@@ -67,24 +69,24 @@ class DescribedSensor final : public ForceSensor {
  private:
   static constexpr std::size_t max_signals = description::max_sensor_signals;
 
-  // A number of the sample, prepared for extraction.
+  // A number in the sample, prepared for extraction.
   struct Slice {
     std::uint16_t byte = 0;
     std::uint8_t bytes = 0, shift = 0;
     bool big_endian = true, is_signed = false, real = false;
     std::uint64_t mask = 0, sign = 0;
   };
-  struct Slot {  // a frame of the sample
+  struct Slot {  // one frame of the sample
     std::uint32_t id = 0;
     std::uint8_t bytes = 0, head_bytes = 0;
-    std::uint16_t at = 0;  // offset of its data in the sample
+    std::uint16_t at = 0;  // offset of the frame's data in the sample
     bool own_head = false;
     std::array<std::uint8_t, 64> head{};
   };
   struct Channel {
     Slice slice;
     double scale = 1.0, offset = 0.0, lowest = 0.0, highest = 0.0;
-    Wrench column{};  // column of the matrix
+    Wrench column{};  // column of the matrix from channel values to wrench
   };
 
   [[nodiscard]] static Slice slice_of(const description::NumberField& number) noexcept;
@@ -107,7 +109,7 @@ class DescribedSensor final : public ForceSensor {
   [[nodiscard]] bool await_sample(CanNetwork& network, std::size_t bus, const FrameHandler& other);
   [[noreturn]] void refuse_start() const;
 
-  // Set-up.
+  // Constant after the set-up.
   description::SensorProtocol protocol_;
   std::string name_;
   std::string file_;
@@ -122,21 +124,24 @@ class DescribedSensor final : public ForceSensor {
   std::int64_t together_ns_ = 0;
   CanFrame poll_frame_{};
 
-  // Cycle.
-  std::array<std::uint8_t, description::max_sample_bytes + 8> sample_{};  // a slice may be read past the end
-  std::size_t next_ = 0;                                                  // slot of the next frame; 0: the first
+  // Changed by the cycle.
+  // Bytes of the sample being received. The array has 8 more bytes, because a slice may be read past the end.
+  std::array<std::uint8_t, description::max_sample_bytes + 8> sample_{};
+  // Slot of the next expected frame; 0: the first frame of a sample.
+  std::size_t next_ = 0;
   std::int64_t begun_ns_ = 0;
-  bool torn_ = false;                             // the order of the next sample isn't certain
-  std::int64_t poll_ns_ = 0, older_poll_ns_ = 0;  // the last poll and the one before
+  bool torn_ = false;  // the order of the next sample's frames isn't certain
+  // Times of the last poll and of the poll before.
+  std::int64_t poll_ns_ = 0, older_poll_ns_ = 0;
   bool polled_ = false;
   bool fresh_ = false;
-  bool counted_ = false;  // a counter has been received
+  bool counted_ = false;  // a sample with a counter has been received
   std::uint64_t last_count_ = 0;
   ChannelWatch watch_;
   std::array<double, max_signals> numbers_{}, values_{};
   ForceSample latest_{};
   DescribedSensorCounts counts_{};
-  DescribedSensorCounts counts_before_{};  // counts at the end of start(); earlier errors aren't losses
+  DescribedSensorCounts counts_before_{};  // counts at the end of start(); errors before that aren't losses
 };
 
 }  // namespace proxarm::fieldbus

@@ -1,4 +1,4 @@
-// Commands to a described sensor before the cycle, and its state in words.
+// Commands to a described sensor before the cycle, and its state as text.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -120,7 +120,7 @@ std::vector<CanFrame> DescribedSensor::command_frames(const SensorCommand& comma
     frame.extended = protocol_.extended;
     frame.fd = protocol_.fd;
     frame.bit_rate_switch = protocol_.bit_rate_switch;
-    // CAN FD has only certain lengths above 8, so data go in frames of at most 8 bytes.
+    // Above 8 bytes CAN FD allows only certain lengths, so data are sent in frames of at most 8 bytes.
     const std::size_t length = std::min<std::size_t>(data.size() - at, 8);
     frame.length = static_cast<std::uint8_t>(length);
     std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(at), length, frame.data.begin());
@@ -137,7 +137,7 @@ void DescribedSensor::send_commands(CanNetwork& network, std::size_t bus, const 
   };
   for (const auto* command : {&protocol_.stop, &protocol_.clear_bias, &protocol_.rate, &protocol_.start}) {
     if (!*command) continue;
-    fresh_ = counted_ = false;  // earlier samples aren't this command's effect
+    fresh_ = counted_ = false;  // samples from before the command don't show its effect
     for (const CanFrame& frame : command_frames(**command)) {
       const SendResult result = network.bus(bus).send(frame);
       if (result == SendResult::sent || result == SendResult::queue_full) continue;
@@ -172,7 +172,7 @@ void DescribedSensor::start(CanNetwork& network, std::size_t bus, const FrameHan
     answered = await_sample(network, bus, other);
   }
   if (!answered) refuse_start();
-  // Samples streamed while other devices are brought up aren't losses.
+  // Samples that the sensor streams while other devices are brought up don't count as lost.
   counted_ = false;
   counts_before_ = counts_;
   if (latest_.healthy) return;

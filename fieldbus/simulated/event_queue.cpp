@@ -22,7 +22,7 @@ void EventQueue::reserve(std::size_t events) {
 
 std::uint32_t EventQueue::take_slot() {
   if (free_slots_.empty()) {
-    // Reserve in all three vectors now, so that push() and release_slot() can't fail later.
+    // Reserve memory in all three vectors now, so that push() and release_slot() can't fail later.
     slots_.emplace_back();
     heap_.reserve(slots_.capacity());
     free_slots_.reserve(slots_.capacity());
@@ -42,7 +42,7 @@ EventQueue::EventId EventQueue::push(std::int64_t time_ns, std::uint32_t slot) {
 
 void EventQueue::release_slot(std::uint32_t slot) noexcept {
   slots_[slot].operations = nullptr;
-  ++slots_[slot].generation;  // invalidates every EventId of the slot
+  ++slots_[slot].generation;  // invalidates every EventId that names this slot
   free_slots_.push_back(slot);
 }
 
@@ -61,7 +61,8 @@ bool EventQueue::run_next(std::int64_t limit_ns) {
   const Entry entry = heap_.front();
   now_ns_ = entry.time_ns > now_ns_ ? entry.time_ns : now_ns_;
   remove_at(0);
-  // Move the callback out of its slot before it runs: it may schedule, and slots move when they grow.
+  // Move the callback out of its slot before it runs: the callback may schedule events, and slots move when their
+  // vector grows.
   struct Running {
     const Operations* operations;
     alignas(std::max_align_t) std::byte storage[callback_bytes];

@@ -1,14 +1,16 @@
-// Discrete events at absolute times; runs the simulated devices and buses.
+// A queue of events at absolute times, which runs the simulated devices and buses.
 //
-// The same queue serves virtual time (SimulatedCanNetwork runs events until the controller's deadline) and real time (a
-// loop sleeps until next_time() and then calls run_until()). Times are int64 nanoseconds of the owner's clock.
+// The queue serves virtual time and real time. In virtual time, SimulatedCanNetwork runs events until the controller's
+// deadline. In real time, a loop sleeps until next_time() and then calls run_until(). Times are int64 nanoseconds of
+// the owner's clock.
 //
-// Events run in the order of time, then of scheduling, so a run depends on its input alone. An event scheduled for the
-// past runs at once, at now_ns(): time never steps back.
+// Events run in the order of their times. Events of equal time run in the order in which they were scheduled, so a run
+// depends on its input alone. An event that is scheduled for a time in the past gets the time now_ns(): time never
+// steps back.
 //
-// A callback is any movable callable of at most `callback_bytes` bytes, called as f() or f(time_ns) with the event's
-// time. It may schedule and cancel events. Its storage is reused: nothing allocates up to the largest number of pending
-// events so far, or the number given to reserve(). Not thread-safe.
+// A callback is any movable callable of at most `callback_bytes` bytes. It is called as f() or f(time_ns) with the
+// event's time. It may schedule and cancel events. Storage of callbacks is reused: the queue allocates only if more
+// events are pending than ever before and more than were given to reserve(). Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +30,7 @@ class EventQueue {
   static constexpr std::size_t callback_bytes = 48;
   static constexpr std::int64_t never = std::numeric_limits<std::int64_t>::max();
 
-  // Names a scheduled event; a default one names no event. cancel() is safe after the event has run.
+  // Names a scheduled event; a default EventId names no event. cancel() may be called even after the event has run.
   struct EventId {
     std::uint32_t slot = 0;
     std::uint32_t generation = 0;
@@ -57,15 +59,17 @@ class EventQueue {
   EventId schedule_after(std::int64_t delay_ns, F&& callback) {
     return schedule(now_ns_ + delay_ns, std::forward<F>(callback));
   }
-  // True if the event was still pending. Its callback is destroyed at once and never runs.
+  // Cancels an event. True if the event was still pending. Its callback is then destroyed at once and never runs.
   bool cancel(EventId id) noexcept;
 
-  // Runs all events up to and including time_ns in order, also those scheduled meanwhile; then now_ns() is time_ns.
+  // Runs all events up to and including time_ns in order, also events that are scheduled while it runs. Then now_ns()
+  // is time_ns.
   void run_until(std::int64_t time_ns);
-  // Runs the next event if its time is at most limit_ns; then now_ns() is its time. False if there is none.
+  // Runs the next event if its time is at most limit_ns; then now_ns() is the event's time. False if there is no such
+  // event.
   bool run_next(std::int64_t limit_ns = never);
-  // Advances time without running events, for a real-time loop before it handles input. Never steps back. Precondition:
-  // next_time() > time_ns.
+  // Advances time without running events, for a real-time loop that is going to handle input. Time never steps back.
+  // Precondition: next_time() > time_ns.
   void advance_to(std::int64_t time_ns) noexcept { now_ns_ = time_ns > now_ns_ ? time_ns : now_ns_; }
 
   [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }
@@ -75,7 +79,7 @@ class EventQueue {
  private:
   struct Operations {
     void (*run)(void* callable, std::int64_t time_ns);
-    void (*move_to)(void* from, void* to) noexcept;  // destroys `from`
+    void (*move_to)(void* from, void* to) noexcept;  // moves the callable and destroys it at `from`
     void (*destroy)(void* callable) noexcept;
   };
   struct Slot {

@@ -11,7 +11,7 @@ namespace {
 
 using description::SetupError;
 
-constexpr int error_frame_bits = 17;  // after the frame: error flag 6, delimiter 8, interframe space 3
+constexpr int error_frame_bits = 17;  // after a destroyed frame: error flag 6, delimiter 8, interframe space 3
 
 void check(const SimulatedBusConfig& config) {
   const auto refuse = [&config](const char* key, std::int64_t found, const char* expected) {
@@ -61,7 +61,7 @@ CanPort& SimulatedCanBus::attach(CanListener& listener, std::string name, NodeFo
                       .advice = "give the bus a data_bitrate, with FD nodes only on it"});
   }
   ports_.push_back(std::make_unique<Port>(*this, std::move(name), &listener, config_.node_transmit_queue_length));
-  if (!transmitting_) request_arbitration();  // frames may have waited for an acknowledgement
+  if (!transmitting_) request_arbitration();  // frames may have waited for a node to acknowledge them
   return *ports_.back();
 }
 
@@ -121,7 +121,7 @@ ErrorCounters SimulatedCanBus::error_counters(std::string_view name) const noexc
   return {};
 }
 
-// A state set by a rule stays until a rule ends it.
+// Sets a port's state for a fault rule. The state stays until a rule sets it to error active.
 void SimulatedCanBus::force_state(Port& port, BusState state) noexcept {
   port.follows_errors = state == BusState::error_active;
   port.errors = {};
@@ -131,10 +131,10 @@ void SimulatedCanBus::force_state(Port& port, BusState state) noexcept {
 void SimulatedCanBus::change_state(Port& port, BusState state) noexcept {
   if (is_off(state)) {
     port.purge();
-    if (sender_ == &port) sender_ = nullptr;  // its frame is cut off, so no port receives it
+    if (sender_ == &port) sender_ = nullptr;  // the port's frame on the wire is cut off, so no port receives it
   }
   port.set_state(state);
-  if (!is_off(state) && !transmitting_) request_arbitration();  // frames may have waited for an acknowledgement
+  if (!is_off(state) && !transmitting_) request_arbitration();  // frames may have waited for a node to acknowledge them
   if (&port == ports_.front().get()) {
     if (state == BusState::bus_off && status_.state != state) ++status_.error_frames;
     status_.state = state;
@@ -172,7 +172,8 @@ void SimulatedCanBus::follow_errors(Port& port) noexcept {
   });
 }
 
-// Schedules an event instead of calling arbitrate(): frames queued at the same time may still take part.
+// Schedules an event for arbitration. arbitrate() isn't called directly, so that frames queued at the same time can
+// still take part.
 void SimulatedCanBus::request_arbitration() {
   if (arbitration_requested_) return;
   arbitration_requested_ = true;
@@ -204,7 +205,8 @@ void SimulatedCanBus::arbitrate() {
   Port* winner = arbitration_winner();
   if (winner == nullptr) return;
   if (!is_acknowledged(*winner)) {
-    // A real controller, error passive, would repeat the frame without end; this one waits silently for another node.
+    // A real controller would repeat the frame without end in the state error passive. This controller waits silently
+    // until another node is there.
     if (winner == ports_.front().get() && status_.state != BusState::error_passive) {
       force_state(*winner, BusState::error_passive);
       ++status_.error_frames;
@@ -229,7 +231,7 @@ void SimulatedCanBus::arbitrate() {
   events_.schedule(idle_ns_ - interframe_ns_, [this] { complete(); });
 }
 
-// At the end of the EOF field: delivers the frame to all ports, then arbitrates again.
+// Ends a frame at the end of its EOF field: delivers the frame to all other ports and requests the next arbitration.
 void SimulatedCanBus::complete() {
   bool destroyed = sender_ == nullptr, duplicated = false, dropped = false;
   for (const std::size_t i : matched_) {

@@ -1,23 +1,26 @@
-// One in-process CAN bus with real bit timing and arbitration, on the event queue of its SimulatedCanNetwork.
+// One in-process CAN bus with real bit timing and arbitration. Its events run on the event queue of its
+// SimulatedCanNetwork.
 //
-// Each port (the controller's, and one per node) has a first-in first-out transmit queue, whose head takes part in
-// arbitration. When the bus goes idle, the head with the dominant identifier wins and occupies the bus for its exact
-// length (can_timing.hpp). All other ports receive the frame at the end of its EOF field; the next frame may start
-// three bits later.
+// The controller has a port, and each node has one. Each port has a first-in first-out transmit queue; the frame at the
+// head of each queue takes part in arbitration. When the bus goes idle, the head with the dominant identifier wins and
+// occupies the bus for the exact length of the frame (can_timing.hpp). All other ports receive the frame at the end of
+// its EOF field. The next frame may start three bits later.
 //
-// A frame that no other node acknowledges isn't delivered: the controller turns error passive, its queue fills up, and
-// it continues when a node is attached or comes back.
+// A frame that no other node acknowledges isn't delivered. If the controller sent it, the controller turns error
+// passive and its queue fills up. It continues when a node is attached or comes back.
 //
-// A frame destroyed by noise (FaultAction::destroy) ends in an error frame and is repeated at once. Every node counts
+// A frame that noise destroys (FaultAction::destroy) ends in an error frame and is repeated at once. Every node counts
 // its errors as in ISO 11898-1:
-//     error      sender's transmit counter +8, others' receive counters +1
-//     success    sender's −1, others' −1 (from above 127 down to 127)
-//     state      by the larger one: error warning from 96, error passive from 128; bus-off when transmit is above 255
-// Bus-off purges the queue. With restart_ns the node returns after that time and 128 times 11 recessive bits; without
-// it, never. Not modelled: the pause of 8 bits that an error passive sender makes after its frames.
+//     error      the sender's transmit counter +8, the receive counters of other nodes +1
+//     success    the sender's transmit counter −1, the receive counters of other nodes −1 (to 127 if above)
+//     state      error warning if a counter is at least 96, error passive if a counter is at least 128,
+//                bus-off if the transmit counter is above 255
+// Bus-off purges the node's queue. With restart_ns > 0 the node returns after that time plus 128 times 11 recessive
+// bits; with restart_ns = 0 it never returns. The pause of 8 bits that an error passive sender makes after its frames
+// isn't modelled.
 //
-// Arbitration is bit by bit: the lower base identifier wins; then a data frame over a remote one, an 11-bit over a
-// 29-bit identifier, a classic over an FD frame.
+// Arbitration is bit by bit. The lower base identifier wins. If the base identifiers are equal, a data frame wins over
+// a remote frame, an 11-bit identifier over a 29-bit identifier, and a classic frame over an FD frame.
 #pragma once
 
 #include <cstddef>
@@ -40,13 +43,16 @@ namespace proxarm::fieldbus {
 
 struct SimulatedBusConfig {
   std::string name;
-  std::int64_t bitrate = 1'000'000;             // bit/s, 10'000 to 1'000'000, the range of CAN
-  std::int64_t data_bitrate = 0;                // bit/s of CAN FD's data phase, up to 8'000'000; 0: a classic bus
-  std::size_t transmit_queue_length = 10;       // frames behind the one in the controller (SocketCAN's txqueuelen)
-  std::size_t node_transmit_queue_length = 64;  // the same for attached nodes
-  std::size_t receive_queue_length = 1024;      // frames; further ones are lost and counted
-  std::int64_t load_window_ns = 1'000'000;      // for BusStatistics::peak_load()
-  std::int64_t restart_ns = 0;                  // after bus-off by errors (SocketCAN's restart-ms); 0: never
+  std::int64_t bitrate = 1'000'000;  // bit/s, 10'000 to 1'000'000, the range of CAN
+  std::int64_t data_bitrate = 0;     // bit/s of the CAN FD data phase, up to 8'000'000; 0: a classic bus
+  // Frames that can wait behind the frame in the controller (SocketCAN's txqueuelen).
+  std::size_t transmit_queue_length = 10;
+  std::size_t node_transmit_queue_length = 64;  // transmit_queue_length of attached nodes
+  // Frames that the controller can hold before they are received; further frames are lost and counted.
+  std::size_t receive_queue_length = 1024;
+  std::int64_t load_window_ns = 1'000'000;  // window of BusStatistics::peak_load()
+  // Time after which a node that went bus-off by errors restarts (SocketCAN's restart-ms); 0: never.
+  std::int64_t restart_ns = 0;
 };
 
 struct ErrorCounters {
@@ -54,16 +60,17 @@ struct ErrorCounters {
   int receive = 0;
 };
 
-// A frame as it was on the wire, for logs. `frame` is valid only during the call.
+// A frame that was on the wire, for logs. `frame` is valid only during the call of the observer.
 struct WireFrame {
   const CanFrame& frame;
   std::int64_t queued_ns;
   std::int64_t start_ns;
-  std::int64_t end_ns;  // time of reception
+  std::int64_t end_ns;  // end of the frame, when it is received
   std::size_t bus;
   std::string_view bus_name;
-  std::string_view sender;  // port name; "controller"
-  bool lost;                // dropped or destroyed by a fault rule
+  // Name of the sender's port, such as "controller"; empty if the sender went off during the frame.
+  std::string_view sender;
+  bool lost;  // true: a fault rule dropped or destroyed the frame
 };
 using WireObserver = std::function<void(const WireFrame&)>;
 
@@ -71,13 +78,14 @@ enum class NodeFormat : std::uint8_t { as_bus, classic, fd };
 
 class SimulatedCanBus final : public CanBus {
  public:
-  // Constructed by SimulatedCanNetwork, which owns the event queue and counts the frames in all receive queues.
+  // SimulatedCanNetwork constructs the bus. `events` is the network's event queue; `frames_waiting` is the number of
+  // frames in the receive queues of all buses, which each bus keeps up to date.
   SimulatedCanBus(SimulatedBusConfig config, std::size_t index, EventQueue& events, std::size_t& frames_waiting);
   ~SimulatedCanBus() override;
 
-  // Adds a node before the start. `listener` must outlive the bus; the port lives as long as the bus. Throws SetupError
-  // if the name is taken, or if a classic and an FD node would share the bus: a classic node answers every FD frame
-  // with an error.
+  // Adds a node. Must be called before the start. `listener` must outlive the bus; the port lives as long as the bus.
+  // Throws SetupError if the name is taken, or if a classic node and an FD node would share the bus, because a classic
+  // node answers every FD frame with an error.
   CanPort& attach(CanListener& listener, std::string name, NodeFormat format = NodeFormat::as_bus);
 
   SendResult send(const CanFrame& frame) noexcept override;
@@ -85,20 +93,24 @@ class SimulatedCanBus final : public CanBus {
   [[nodiscard]] const BusStatus& status() const noexcept override { return status_; }
   [[nodiscard]] const std::string& name() const noexcept override { return config_.name; }
 
-  // bus_off and down purge the port's queue and disconnect it; the error_ states reconnect it. False: no such port.
+  // Sets the state of a port. The states bus_off and down purge the port's queue and disconnect the port; the error_
+  // states connect it again. False if there is no such port.
   bool set_state(std::string_view port, BusState state) noexcept;
-  // Zeros if there is no such port.
+  // Returns zeros if there is no such port.
   [[nodiscard]] ErrorCounters error_counters(std::string_view port) const noexcept;
   void set_observer(WireObserver observer) { observer_ = std::move(observer); }
 
   [[nodiscard]] const SimulatedBusConfig& config() const noexcept { return config_; }
   [[nodiscard]] BusStatistics& statistics() noexcept { return statistics_; }
   [[nodiscard]] const BusStatistics& statistics() const noexcept { return statistics_; }
-  [[nodiscard]] double load() const noexcept { return statistics_.load(events_.now_ns()); }  // since reset()
-  [[nodiscard]] std::size_t transmit_queue_size() const noexcept;  // the controller's, including the frame on the wire
+  // Returns the bus load since the last reset of the statistics.
+  [[nodiscard]] double load() const noexcept { return statistics_.load(events_.now_ns()); }
+  // Returns the size of the controller's transmit queue, including the frame on the wire.
+  [[nodiscard]] std::size_t transmit_queue_size() const noexcept;
 
   [[nodiscard]] bool has_port(std::string_view name) const noexcept;
-  // For SimulatedCanNetwork::apply(): throws SetupError if a rule names a port that the bus doesn't have.
+  // Adds a rule; called by SimulatedCanNetwork::apply(). Throws SetupError if the rule names a port that the bus
+  // doesn't have.
   void add_fault(const FaultRule& rule);
 
  private:
@@ -142,23 +154,23 @@ class SimulatedCanBus final : public CanBus {
   BusStatus status_;
   BusStatistics statistics_;
   WireObserver observer_;
-  std::vector<std::unique_ptr<Port>> ports_;  // the controller's first
+  std::vector<std::unique_ptr<Port>> ports_;  // the first port is the controller's
   RingBuffer<TimedFrame> received_;
 
   // The frame on the wire.
   CanFrame current_;
-  Port* sender_ = nullptr;  // nullptr: the bus is idle, or the sender went off during its frame
+  Port* sender_ = nullptr;  // nullptr: the bus is idle, or the sender went off the bus during its frame
   std::int64_t current_start_ns_ = 0;
   std::int64_t current_queued_ns_ = 0;
   bool transmitting_ = false;
-  bool repeating_ = false;  // second transmission of a duplicated frame
+  bool repeating_ = false;  // the frame on the wire is the second transmission of a duplicated frame
   bool arbitration_requested_ = false;
-  bool alone_ = false;        // the controller is error passive because no node acknowledges
-  bool any_errors_ = false;   // some counter is above zero
+  bool alone_ = false;        // the controller is error passive because no node acknowledges its frames
+  bool any_errors_ = false;   // some error counter is above zero
   std::int64_t idle_ns_ = 0;  // earliest start of the next frame
 
   std::vector<ActiveFault> faults_;
-  std::vector<std::size_t> matched_;  // indices of the faults that apply to the current frame
+  std::vector<std::size_t> matched_;  // indices in faults_ of the rules that apply to the frame on the wire
   std::vector<DelayedFrame> delayed_;
   std::vector<std::size_t> free_delayed_;
 };

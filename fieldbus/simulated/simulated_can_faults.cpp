@@ -12,7 +12,7 @@ namespace {
 
 using description::SetupError;
 
-// Alters the content of a frame that a rule matches.
+// Alters the content of a frame to which the rule applies.
 void alter(CanFrame& frame, const FaultRule& rule) noexcept {
   if (rule.action == FaultAction::corrupt) {
     for (const BitFlip flip : rule.flips) {
@@ -120,7 +120,8 @@ void SimulatedCanBus::babble(const FaultRule& rule) {
                       .message = "needs a period above 0 and a frame that this bus can carry"});
   }
   Port* port = ports_.emplace_back(std::make_unique<Port>(*this, "babbling node", nullptr, 1)).get();
-  // Kept among the faults for its frame; `first` at its maximum keeps it from matching any frame.
+  // The rule is kept in faults_ for the frame that it sends. Its `first` is set to the maximum, so it never matches a
+  // frame.
   ActiveFault fault{rule, 0};
   fault.rule.first = std::numeric_limits<std::uint64_t>::max();
   faults_.push_back(fault);

@@ -73,7 +73,8 @@ std::int64_t monotonic_ns() noexcept {
 void SimulatedCanNetwork::follow_real_time() {
   real_time_ = true;
   real_time_offset_ns_ = monotonic_ns() - now_ns();
-  woken_late_ns_ = std::numeric_limits<std::int64_t>::max();  // so that the first lateness is no gap
+  // The largest value, so that the first lateness doesn't count as a gap.
+  woken_late_ns_ = std::numeric_limits<std::int64_t>::max();
 }
 
 std::int64_t SimulatedCanNetwork::behind_ns() const noexcept {
@@ -102,7 +103,8 @@ void SimulatedCanNetwork::sleep_until(std::int64_t deadline_ns) noexcept {
   live_through_gap();
 }
 
-// A gap is lateness that arose since the last sleep. Lateness that adds up over many sleeps comes from a slow machine.
+// If the machine had a gap, runs the events of the gap. A gap is lateness that arose during the last sleep. Lateness
+// that grows over many sleeps comes from a slow machine and is no gap.
 void SimulatedCanNetwork::live_through_gap() noexcept {
   const std::int64_t before_ns = woken_late_ns_;
   woken_late_ns_ = behind_ns();

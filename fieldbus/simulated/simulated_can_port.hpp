@@ -1,4 +1,4 @@
-// The ports of a simulated bus; private to the sources of SimulatedCanBus.
+// The ports of a simulated bus. Only for the source files of SimulatedCanBus.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,8 @@ namespace proxarm::fieldbus {
 
 inline constexpr std::uint64_t no_frame = std::numeric_limits<std::uint64_t>::max();
 
-// The bits of arbitration up to the BRS bit, first on the wire = most significant; the lowest number wins:
+// Returns the bits of arbitration up to the BRS bit as a number. The first bit on the wire is the most significant bit,
+// so the lowest number wins:
 //   11-bit: id 11, RTR, IDE 0, FDF
 //   29-bit: id 11, SRR 1, IDE 1, id 18, RTR, FDF
 inline std::uint64_t arbitration_key(const CanFrame& frame) noexcept {
@@ -51,7 +52,8 @@ class SimulatedCanBus::Port final : public CanPort {
   }
   [[nodiscard]] const Queued& head() const noexcept { return queue_.front(); }
   [[nodiscard]] std::size_t queue_size() const noexcept { return queue_.size(); }
-  [[nodiscard]] std::uint64_t key() const noexcept { return key_; }  // of the head; no_frame: queue empty
+  // Key of the head frame; no_frame: the queue is empty.
+  [[nodiscard]] std::uint64_t key() const noexcept { return key_; }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] CanListener* listener() const noexcept { return listener_; }
   [[nodiscard]] bool receives() const noexcept { return listener_ != nullptr || this == bus_.ports_.front().get(); }
@@ -59,7 +61,7 @@ class SimulatedCanBus::Port final : public CanPort {
   void set_state(BusState state) noexcept { state_ = state; }
 
   ErrorCounters errors;
-  bool follows_errors = true;  // false: a fault rule sets its state
+  bool follows_errors = true;  // false: a fault rule sets the port's state
 
  private:
   std::uint64_t key_ = no_frame;

@@ -11,10 +11,12 @@
 namespace proxarm::models {
 namespace {
 
-// Rounding of a square and its root is less.
+// A contact sticks without an exact comparison if ‖z_t‖² is below the squared friction limit by more than this share.
+// The share is larger than the rounding of a square and of its root.
 constexpr double kNextToLimit = 1e-14;
 
-// Alart and Curnier's projection of z = f − u/w, and the state that it tells.
+// The result of Alart and Curnier's projection of z = f − u/w: the projected force, and the state of the contact that
+// follows from it.
 struct Projected {
   Vec3 f = Vec3::Zero();
   ContactState state = ContactState::open;
@@ -26,7 +28,7 @@ inline Projected project(const Vec3& z, double mu) noexcept {
   const double z_t2 = z.tail<2>().squaredNorm(), limit = mu * z[0];
   out.f = z;
   out.state = ContactState::stick;
-  if (z_t2 < (1.0 - kNextToLimit) * (limit * limit)) return out;  // most do, and need no root
+  if (z_t2 < (1.0 - kNextToLimit) * (limit * limit)) return out;  // most contacts end here and need no root
   const double z_t = std::sqrt(z_t2);
   if (z_t <= limit) return out;
   out.state = ContactState::slip;
@@ -34,26 +36,30 @@ inline Projected project(const Vec3& z, double mu) noexcept {
   return out;
 }
 
-// How much stiffer than the coupling the contacts are in Newton's iteration. The multipliers converge by 1/(1 + kStiff
-// λ) a step, λ being the smallest eigenvalue of the scaled W = H Hᵀ that isn't 0; beyond 1e9 rounding (kStiff u) would
-// be felt in the states.
+// How many times stiffer than the coupling the contacts are in Newton's method. In each step the error of the
+// multipliers falls by the factor 1/(1 + kStiff λ), where λ is the smallest eigenvalue of the scaled W = H Hᵀ that
+// isn't 0. With kStiff above 1e9, rounding of kStiff u would change the states.
 constexpr double kStiff = 1e7;
-// Relative to what the free motion would press with: a hundred roundings of sums over rows.
+// Tolerance of a solution, as a share of the force that make_rows() returns. It is about a hundred roundings of sums
+// over rows.
 constexpr double kTolerance = 1e-12;
-// Where contacts hold each other (an edge, a face), rounding of the stiff ones moves a slip that is next to none, and
-// the law is met to some 1e-11 only. After so many steps that is taken: 1e-9 N of 10 N.
+// Tolerance after kQuiet steps. If contacts hold each other (along an edge, on a face), rounding of the stiff contacts
+// moves a slip that is nearly zero, so the law is obeyed only to about 1e-11. The tolerance is 1e-9 N of 10 N.
 constexpr double kNoisyTolerance = 1e-10;
 constexpr int kQuiet = 18;
-constexpr double kRough = 1e-7;  // before the forces are balanced
-constexpr int kAttempts = 6;     // of Gauss and Seidel's, each with twice the sweeps of the one before
-// Of so few contacts all combinations of states are tried before Gauss and Seidel's sweeps are: with so many steps
-// each, and only as long as each leaves less than this share of what the law was missed by before it.
+constexpr double kRough = 1e-7;  // tolerance before balance() has corrected the forces
+// Number of attempts by Gauss-Seidel sweeps. Each attempt has twice as many sweeps as the attempt before.
+constexpr int kAttempts = 6;
+// Up to kFew contacts, all combinations of states are tried before the Gauss-Seidel sweeps, with at most kQuickSteps
+// Newton steps each. A combination is given up when a step leaves more than the share kStays of the violation before
+// the step.
 constexpr std::size_t kFew = 3;
 constexpr int kQuickSteps = 8;
 constexpr double kStays = 0.7;
-// The share of what the gap that is missed most takes to be held (make_rows()).
+// The force that closes the most negative gap is multiplied by this share in make_rows().
 constexpr double kMissed = 0.1;
-// Where friction is raised from nothing: steps of Newton's at each share of it, and the least by which it is raised.
+// For by_more_friction(): the number of Newton steps at each level of friction, and the smallest share by which
+// friction is raised.
 constexpr int kRaised = 8;
 constexpr double kLeastRaise = 1.0 / 128.0;
 
@@ -76,8 +82,9 @@ Twist ContactProblem::yield_to(const Twist& wrench) const noexcept {
   return L_inverse_.transpose() * (L_inverse_ * wrench);
 }
 
-// Returns what the free motion would press with; or, where a pose of the iteration is p̂ itself and that is nothing, a
-// share of what the gap that is missed most takes to be held.
+// Fills rows_. Returns the force to which tolerances refer: the force that the free motion would exert, or the share
+// kMissed of the force that closes the most negative gap, whichever is larger. The second force is needed because a
+// pose of the iteration may be p̂ itself; the free motion then exerts no force.
 double ContactProblem::make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept {
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const LinearContact& contact = contacts[i];
@@ -95,7 +102,8 @@ double ContactProblem::make_rows(const Twist& e, std::span<const LinearContact> 
   return size;
 }
 
-// ‖f − P(f − u/w)‖ + ‖Σ Hᵀf − y‖, in the units of y: 0 at a solution, and nowhere else.
+// Returns the larger of max_c √w ‖f − P(f − u/w)‖ (over the contacts c) and ‖Σ Hᵀf − y‖, both in the units of y. It is
+// 0 exactly at the solutions.
 double ContactProblem::violation(Rows rows, const Twist& y) noexcept {
   Twist off = -y;
   double law = 0.0;
@@ -106,7 +114,7 @@ double ContactProblem::violation(Rows rows, const Twist& y) noexcept {
     off += row.H.transpose() * row.f;
     law = std::max(law, (row.f - now.f).norm() * row.root_w);
   }
-  return std::max(off.norm(), law);  // in this order: what isn't a number stays so
+  return std::max(off.norm(), law);  // in this order, NaN in `off` stays NaN
 }
 
 void ContactProblem::look(Rows rows, const Twist& y) noexcept {
@@ -120,7 +128,7 @@ void ContactProblem::take_seen_states(Rows rows) noexcept {
   for (Row& row : rows) row.state = row.seen;
 }
 
-// The same as a sum of squares.
+// Returns the violation of the law and of y = Σ Hᵀf as a sum of squares.
 double ContactProblem::residual2(Rows rows, const Twist& y) noexcept {
   Twist off = -y;
   double law2 = 0.0;
@@ -131,11 +139,13 @@ double ContactProblem::residual2(Rows rows, const Twist& y) noexcept {
   return law2 + off.squaredNorm();
 }
 
-// One step of semismooth Newton for y and f, with the states chosen before. Each contact's new force is linear in its
-// new displacement, f⁺ = f̄ − P u⁺:
-//   stick  u⁺ = 0, for which f⁺ = f − R u⁺ with a large R (the proximal point: redundant rows need no choice)
-//   slip   u_n⁺ = 0 likewise; f_t⁺ = μ (f_n⁺ d + z_n T z_t⁺/‖z_t‖), d = z_t/‖z_t‖, T = I − d dᵀ, z = f − u/w. Along d
-//          that is μ f_n⁺, across it −a/(1 − a) u_t⁺/w with a = μ z_n/‖z_t‖
+// Makes one step of semismooth Newton for y and f, with the states chosen before. The new force of each contact is
+// linear in its new displacement, f⁺ = f̄ − P u⁺:
+//   open   f⁺ = 0
+//   stick  u⁺ = 0, written as f⁺ = f − R u⁺ with a large R (proximal point, so redundant rows need no choice)
+//   slip   u_n⁺ = 0, written in the same way; f_t⁺ = μ (f_n⁺ d + z_n T z_t⁺/‖z_t‖)
+//          with z = f − u/w, d = z_t/‖z_t‖ and T = I − d dᵀ.
+//          The part of f_t⁺ along d is μ f_n⁺. The part across d is −a/(1 − a) u_t⁺/w with a = μ z_n/‖z_t‖.
 bool ContactProblem::newton_step(Rows rows, Twist& y) noexcept {
   Mat6 A = Mat6::Identity();
   Twist off = -y;
@@ -203,8 +213,9 @@ void ContactProblem::go_to(const Iterate& a, Rows rows, Twist& y) noexcept {
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i].f = a.f[i];
 }
 
-// Newton with a line search, where plain steps cycle between states: of the halves of a step the first that lessens the
-// residual is taken, or the least of all.
+// Newton's method with a line search, for problems in which plain steps cycle between states. The step is halved until
+// the residual becomes smaller than before the step. Of the tried shares of the step, the one with the smallest
+// residual is taken.
 bool ContactProblem::damped_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept {
   for (int k = 0; k < most_iterations && may_look_at(rows); ++k) {
     look(rows, y);
@@ -236,11 +247,12 @@ bool ContactProblem::is_solved(Rows rows, const Twist& y, double size, double to
   return violation(rows, y) <= tolerance * size;
 }
 
-// Forces carry the rounding of u times r. What the sum lacks of y is made up for by the smallest changes that the
-// states allow: along the normal and the tangents where it sticks, along the cone's ray where it slips.
+// Corrects the forces so that Σ Hᵀf equals y, because the forces contain the rounding of u multiplied by R. The
+// difference is made up by the smallest changes that the states allow: along the normal and the tangents for a sticking
+// contact, along the force's own ray on the cone for a slipping contact.
 void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
   FactoredMatrix factors;
-  bool changes = true;  // rays of what slips, with its forces
+  bool changes = true;  // the rays of slipping contacts change with the forces
   for (int k = 0; k < 2; ++k) {
     Mat6 G = Mat6::Zero();
     Twist lack = y;
@@ -277,7 +289,7 @@ void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
 
 void ContactProblem::gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept {
   y.setZero();
-  std::array<double, most> yields;  // a bound of the largest eigenvalue of H Hᵀ, m/N
+  std::array<double, most> yields;  // upper bound of the largest eigenvalue of H Hᵀ, m/N
   for (std::size_t i = 0; i < rows.size(); ++i) {
     y += rows[i].H.transpose() * rows[i].f;
     yields[i] = (rows[i].H * rows[i].H.transpose()).norm();
@@ -285,7 +297,7 @@ void ContactProblem::gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept {
   for (int k = 0; k < sweeps && may_look_at(rows); ++k) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       Row& row = rows[i];
-      for (int j = 0; j < 3; ++j) {  // a few projections on the contact's own law
+      for (int j = 0; j < 3; ++j) {  // a few projections on the law of this contact
         const Projected now = project(row.f - (row.H * y + row.b) / yields[i], row.mu);
         y += row.H.transpose() * (now.f - row.f);
         row.f = now.f;
@@ -295,9 +307,9 @@ void ContactProblem::gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept {
   }
 }
 
-// Without friction there is a solution wherever gaps can be kept. From there friction is raised, by as much as Newton's
-// method follows. (Of 2,149 problems of a random hunt that neither Newton's method nor sweeps within a step's work
-// solved it finds 1,120.)
+// Solves the problem without friction, which has a solution if all gaps can be kept. Then raises friction as far as
+// Newton's method follows. (Of 2,149 problems of a random search that neither Newton's method nor Gauss-Seidel sweeps
+// solved within the work of a step, this function solves 1,120.)
 bool ContactProblem::by_more_friction(Rows rows, Twist& y, double size) noexcept {
   std::array<double, most> mu;
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -352,7 +364,8 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
     if (attempt == 0) {
       for (Row& row : rows) row.f.setZero();
     }
-    if (attempt == 1 && !slippery) {  // most are solved by the first sweeps, for less
+    // The sweeps of attempt 0 solve most problems, and cost less than by_more_friction().
+    if (attempt == 1 && !slippery) {
       const Iterate swept = kept(rows, y);
       solved = by_more_friction(rows, y, size);
       if (solved) break;
@@ -382,7 +395,7 @@ bool ContactProblem::holds(const Twist& e, std::span<LinearContact> contacts, Tw
   const Rows rows(rows_.data(), contacts.size());
   Twist y = Twist::Zero();
   for (const Row& row : rows) {
-    if (row.f[0] < 0.0) return false;  // its normal has turned on: nothing pulls
+    if (row.f[0] < 0.0) return false;  // the contact's normal has turned since, so that this force would pull
     y += row.H.transpose() * row.f;
   }
   delta = L_inverse_.transpose() * y - e;
@@ -395,8 +408,9 @@ bool ContactProblem::holds(const Twist& e, std::span<LinearContact> contacts, Tw
   return true;
 }
 
-// Newton with the states held that `reached` tells, but for one contact's: where contacts nearly wedge the tool, Gauss
-// and Seidel's creeps towards a state that it never reaches.
+// Runs Newton's method with the states of `reached` held fixed, except for the state of one contact. Each contact and
+// each other state is tried. This is needed if contacts nearly wedge the tool: Gauss-Seidel then creeps towards a state
+// that it never reaches.
 bool ContactProblem::next_to(const Iterate& reached, Rows rows, Twist& y, double size) noexcept {
   for (std::size_t flipped = 0; flipped < rows.size(); ++flipped) {
     for (int turn = 1; turn <= 2; ++turn) {
@@ -411,7 +425,8 @@ bool ContactProblem::next_to(const Iterate& reached, Rows rows, Twist& y, double
   return false;
 }
 
-// `quick`: no longer than while what the law is missed by lessens.
+// Runs Newton's method with fixed states. `quick`: gives up as soon as a step doesn't reduce the violation by enough
+// (kStays).
 bool ContactProblem::held_newton(Rows rows, Twist& y, double size, int most_iterations, bool quick) noexcept {
   double last = std::numeric_limits<double>::infinity();
   for (int k = 0; k < most_iterations && may_look_at(rows); ++k) {
@@ -424,7 +439,7 @@ bool ContactProblem::held_newton(Rows rows, Twist& y, double size, int most_iter
   return false;
 }
 
-// The same from no forces.
+// Runs held_newton() from y = start and from zero forces.
 bool ContactProblem::newton_with_states(Rows rows, Twist& y, double size, Twist start, bool quick) noexcept {
   y = start;
   for (Row& row : rows) row.f.setZero();

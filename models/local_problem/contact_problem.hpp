@@ -1,21 +1,26 @@
-// The local problem of a step: a rigid tool on a coupling K, held by contacts whose geometry is frozen at a pose q_i.
+// Solves the local problem of a step: a rigid tool on a coupling K is held by contacts whose geometry is frozen at a
+// pose q_i.
 //
-//   K (e + δ) = Σ J_cᵀ f_c          e = q_i ⊟ p̂, δ the twist from q_i to the solution
-//   u_c = J_c δ + c_c               rows: gap; displacement of the material point since q(k−1) along two tangents
-//   0 ≤ u_n ⊥ f_n ≥ 0,  ‖f_t‖ ≤ μ f_n,  and u_t ≠ 0 → f_t = −μ f_n u_t/‖u_t‖      Coulomb's law as it is
+//   K (e + δ) = Σ J_cᵀ f_c          e = q_i ⊟ p̂; δ is the twist from q_i to the solution
+//   u_c = J_c δ + c_c               row 1: gap; rows 2, 3: displacement of the material point since q(k−1), along
+//                                   two tangents
+//   0 ≤ u_n ⊥ f_n ≥ 0,  ‖f_t‖ ≤ μ f_n,  and u_t ≠ 0 → f_t = −μ f_n u_t/‖u_t‖      Coulomb's law, not approximated
 //
-// With K = L Lᵀ, y = Lᵀ(e + δ) and H = J L⁻ᵀ this is y = Σ Hᵀf, u = H y + b: six unknowns, however many contacts.
+// With K = L Lᵀ, y = Lᵀ(e + δ) and H = J L⁻ᵀ this becomes y = Σ Hᵀf, u = H y + b: six unknowns, whatever the number of
+// contacts.
 //
-// A single contact has a way of its own (one_contact.cpp).
-//
-// Method: Alart and Curnier's projection ("A mixed formulation for frictional contact problems prone to Newton like
-// solution methods", 1991) writes the law as f = P(f − r u) for any r > 0, with P the projection on the cone's section.
-// Semismooth Newton on y, with f as multipliers, solves a 6 × 6 system each time and converges in two to five; r is
-// large, so the multipliers settle in two. Without friction there is a solution wherever gaps can be kept, and it is
-// found (frictionless.cpp). With friction, where Newton cycles: of up to three contacts all combinations of free, stick
-// and slip are tried; then projected Gauss-Seidel over the contacts (Jean and Moreau's nonsmooth contact dynamics)
-// leads to the neighbourhood of a solution, and a line search keeps it there; then friction is raised from nothing, and
-// the solution followed. What is returned has passed the law's own test.
+// Methods:
+// 1. A single contact is solved without a system of six unknowns (one_contact.cpp).
+// 2. Semismooth Newton. Alart and Curnier's projection ("A mixed formulation for frictional contact problems prone to
+//    Newton like solution methods", 1991) writes the law as f = P(f − r u) for any r > 0; P is the projection on the
+//    cone's section. Newton on y, with f as multipliers, solves a 6 × 6 system in each step and converges in two to
+//    five steps. r is large, so the multipliers converge in two steps.
+// 3. Without friction there is a solution if all gaps can be kept, and it is always found (frictionless.cpp).
+// 4. With friction, Newton may cycle. Up to three contacts, all combinations of open, stick and slip are then tried.
+// 5. Projected Gauss-Seidel over the contacts (Jean and Moreau's nonsmooth contact dynamics) leads near a solution, and
+//    Newton with a line search goes on from there.
+// 6. If the first sweeps fail, friction is raised from zero, and the solution is followed.
+// Every solution that is returned has passed the test of the law itself.
 #pragma once
 
 #include <array>
@@ -31,45 +36,47 @@ namespace proxarm::models {
 enum class ContactState : std::uint8_t { open, stick, slip };
 
 struct LinearContact {
-  Eigen::Matrix<double, 3, 6> J;  // rows: normal, tangents; of the twist at the reference point
-  Vec3 c = Vec3::Zero();          // gap, slip at δ = 0; m
+  // Rows: normal, two tangents; maps a twist at the reference point to displacements of the contact.
+  Eigen::Matrix<double, 3, 6> J;
+  Vec3 c = Vec3::Zero();  // gap, and slip along the tangents, at δ = 0; m
   double mu = 0.0;
-  Vec3 f = Vec3::Zero();  // in: a guess; out: along normal and tangents, N
+  Vec3 f = Vec3::Zero();  // in: a guess; out: the force along normal and tangents, N
   ContactState state = ContactState::open;
 };
 
 class ContactProblem {
  public:
-  // So many contacts are solved together; 24 is six boxes' faces at once.
+  // Largest number of contacts that are solved together: 24 is the number for six faces of boxes at once.
   static constexpr std::size_t most = 24;
 
-  // Precondition: symmetric and positive definite. Remembered, so that the same K again costs a comparison.
+  // Sets K, and does nothing if K hasn't changed. Precondition: K is symmetric and positive definite.
   void set_stiffness(const Mat6& K) noexcept;
 
-  // Fills in δ, and f and state of the contacts. False: no solution found; δ then holds all gaps open as far as
-  // Gauss-Seidel got. Precondition: at most `most` contacts.
-  // `rough`: what the law may be missed by, over the free motion's press, in a problem that is going to be put again
-  // from where this one leads; 0: nothing but rounding.
+  // Finds δ, and f and state of each contact. False if no solution was found; δ is then the last result of the
+  // Gauss-Seidel sweeps, which keeps gaps only as far as the sweeps have converged. `rough` is the violation of the law
+  // that may remain, as a share of the force that the free motion would exert, if the problem will be posed again from
+  // this solution; 0: only rounding may remain. Precondition: at most `most` contacts.
   bool solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta, double rough = 0.0) noexcept;
 
-  // Whether the forces that are given keep the law, to rounding, and where they bring the tool. Where contacts hold
-  // each other, forces are many that do, and solve() leads from ones that do to others: it asks for gaps that rounding
-  // has made contradict each other.
+  // True if the contacts' given forces obey the law to within rounding. δ is then the twist to which these forces lead,
+  // and the contacts' states are set. This test is useful before solve(): if contacts hold each other, many sets of
+  // forces obey the law, and solve() would replace one such set by another, because it requires gaps that rounding has
+  // made contradict each other.
   bool holds(const Twist& e, std::span<LinearContact> contacts, Twist& delta) noexcept;
 
-  // Whether a single contact is solved in closed form (one_contact.cpp).
+  // Sets whether one_contact() is used for a single contact (one_contact.cpp).
   void use_closed_form(bool use) noexcept { closed_form_ = use; }
 
-  // How much solve() may still do, all calls together: contacts that a step of Newton's or a sweep of Gauss and
-  // Seidel's looks at. Without a call it may do all that it knows.
+  // Limits the work of all following calls of solve() together. The unit is one contact in one step of Newton's method
+  // or one Gauss-Seidel sweep. Without a call of allow(), the work isn't limited.
   void allow(int work) noexcept { work_ = work; }
   [[nodiscard]] bool exhausted() const noexcept { return work_ <= 0; }
 
-  // The number of different y among all combinations of free, stick and slip, for up to four contacts: 1 where the
-  // solution is unique. Costs up to 3⁴ Newton iterations.
+  // Returns the number of different y among all combinations of open, stick and slip, for up to four contacts. It is 1
+  // if the solution is unique. The function runs Newton's method up to 3⁴ times.
   int count_solutions(const Twist& e, std::span<const LinearContact> contacts) noexcept;
 
-  // The twist that the wrench of a contact's force makes the coupling yield by: K⁻¹ w.
+  // Returns K⁻¹ w: the twist by which the coupling yields to a contact's wrench w.
   [[nodiscard]] Twist yield_to(const Twist& wrench) const noexcept;
 
  private:
@@ -77,11 +84,11 @@ class ContactProblem {
     Eigen::Matrix<double, 3, 6> H;
     Vec3 b;
     double mu = 0.0;
-    double w = 0.0;  // the trace of H Hᵀ: how far the contact yields to a newton, m/N
+    double w = 0.0;  // trace of H Hᵀ: how far the contact yields per newton, m/N
     double root_w = 0.0;
     Vec3 f;
     ContactState state = ContactState::open;
-    // What look() or violation() saw last: u at y, and the state that the projection tells.
+    // Results of the last look() or violation(): u at y, and the state that follows from the projection.
     Vec3 u;
     ContactState seen = ContactState::open;
   };
@@ -94,7 +101,7 @@ class ContactProblem {
   static bool one_contact(Row& row, Twist& y, double size, double tolerance) noexcept;
   static void look(Rows rows, const Twist& y) noexcept;
   static void take_seen_states(Rows rows) noexcept;
-  // Precondition: rows have been looked at, at y.
+  // Precondition: look() or violation() was called at y.
   static bool newton_step(Rows rows, Twist& y) noexcept;
   bool newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
   bool damped_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
@@ -108,9 +115,9 @@ class ContactProblem {
   static double residual2(Rows rows, const Twist& y) noexcept;
   static Iterate kept(Rows rows, const Twist& y) noexcept;
   static void go_to(const Iterate& a, Rows rows, Twist& y) noexcept;
-  // a + share (b − a)
+  // Sets the iterate to a + share (b − a).
   static void go_to(const Iterate& a, const Iterate& b, double share, Rows rows, Twist& y) noexcept;
-  static bool without_friction(Rows rows, Twist& y) noexcept;  // false: nothing keeps all gaps
+  static bool without_friction(Rows rows, Twist& y) noexcept;  // false: no y keeps all gaps
   bool by_more_friction(Rows rows, Twist& y, double size) noexcept;
   bool enumerate(Rows rows, Twist& y, double size, int* different) noexcept;
   double make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept;

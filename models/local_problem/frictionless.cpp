@@ -1,9 +1,10 @@
-// The local problem without friction: y is the point nearest to 0 in the intersection of half-spaces H_n y + b_n ≥ 0.
+// Solves the local problem without friction: finds the point y nearest to 0 in the intersection of the half-spaces H_n
+// y + b_n ≥ 0, one for each contact.
 //
-// Goldfarb and Idnani's dual method ("A numerically stable dual method for solving strictly convex quadratic programs",
-// 1983) holds the half-spaces that are missed, one after the other, and lets go those whose force would become
-// negative; it ends after finitely many steps wherever there is a solution, however nearly the contacts depend on each
-// other.
+// Method: Goldfarb and Idnani's dual method ("A numerically stable dual method for solving strictly convex quadratic
+// programs", 1983). It adds violated half-spaces one after the other to a set of held half-spaces, and removes those
+// whose force would become negative. It ends after finitely many steps if there is a solution, even if the contacts
+// nearly depend on each other.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,23 +15,26 @@
 namespace proxarm::models {
 namespace {
 
-// Half-spaces that are missed by less are held: a tenth of what a mesh's faces stand out by.
+// A half-space that is violated by less than this counts as satisfied. It is a tenth of the distance by which a mesh's
+// faces are offset outwards (1e-13 m).
 constexpr double kHeld_m = 1e-14;
-// A normal of which less than this share is new depends on those that hold already: what is left of it is rounding.
+// A normal depends on the held normals if the part of it perpendicular to them is below this share: this part is only
+// rounding.
 constexpr double kNew = 1e-6;
-// Such a one may be missed by a tenth of what a gap may be short of.
+// A half-space whose normal depends on the held normals may be violated by this much. It is a tenth of the gap
+// tolerance (kGap_m).
 constexpr double kMissed_m = 1e-13;
-constexpr int kMostChanges = 96;  // four for each contact
+constexpr int kMostChanges = 96;  // changes of the held set: four for each contact
 
 class Holding {
  public:
-  // In place of the normals that hold, their factors: N = Q R.
+  // Factors the held normals: N = Q R.
   void set(std::span<const Twist> normals, std::span<const std::size_t> held) noexcept {
     count_ = held.size();
     R_.setZero();
     for (std::size_t i = 0; i < count_; ++i) {
       Twist q = normals[held[i]];
-      // Twice is enough.
+      // Two rounds of orthogonalisation are enough.
       for (int round = 0; round < 2; ++round) {
         for (std::size_t j = 0; j < i; ++j) {
           const double along = Q_[j].dot(q);
@@ -43,7 +47,8 @@ class Holding {
       Q_[i] = q / size;
     }
   }
-  // What of a normal is new, and how the forces that hold change as its own grows by one.
+  // Returns the part of `normal` that is perpendicular to the held normals. change[j] becomes the amount by which held
+  // force j falls when the force along `normal` grows by one.
   [[nodiscard]] Twist beyond(const Twist& normal, std::array<double, 6>& change) const noexcept {
     Twist z = normal;
     std::array<double, 6> along{};
@@ -57,7 +62,7 @@ class Holding {
     change = weights(along);
     return z;
   }
-  // The point nearest to 0 at which all that hold touch: Nᵀy = −b.
+  // Returns the point nearest to 0 at which all held half-spaces are touched: Nᵀy = −b.
   [[nodiscard]] Twist place(const std::array<double, 6>& b) const noexcept {
     Twist y = Twist::Zero();
     std::array<double, 6> x{};
@@ -69,7 +74,7 @@ class Holding {
     }
     return y;
   }
-  // The forces of those that hold, whose sum is y.
+  // Returns the forces of the held half-spaces whose sum is y.
   [[nodiscard]] std::array<double, 6> forces(const Twist& y) const noexcept {
     std::array<double, 6> along{};
     for (std::size_t j = 0; j < count_; ++j) along[j] = Q_[j].dot(y);
@@ -77,7 +82,7 @@ class Holding {
   }
 
  private:
-  // R x = a.
+  // Solves R x = a.
   [[nodiscard]] std::array<double, 6> weights(const std::array<double, 6>& a) const noexcept {
     std::array<double, 6> x{};
     for (std::size_t k = count_; k-- > 0;) {
@@ -119,7 +124,7 @@ bool ContactProblem::without_friction(Rows rows, Twist& y) noexcept {
         row.state = ContactState::open;
       }
       holding.set({normals.data(), rows.size()}, {held.data(), count});
-      // What the changes have rounded is taken off.
+      // y and the forces are computed again from the held set, which removes the rounding of all changes.
       std::array<double, 6> b{};
       for (std::size_t j = 0; j < count; ++j) b[j] = rows[held[j]].b[0];
       y = holding.place(b);
@@ -147,7 +152,7 @@ bool ContactProblem::without_friction(Rows rows, Twist& y) noexcept {
         let_go = j;
       }
       if (!std::isfinite(growth)) {
-        if (!(missed > -kMissed_m)) return false;  // nothing is in all half-spaces
+        if (!(missed > -kMissed_m)) return false;  // no point lies in all half-spaces
         depends[worst] = true;
         break;
       }

@@ -1,10 +1,13 @@
-// The local problem of a single contact, which most steps have: without a system of six unknowns.
+// Solves the local problem of a single contact, which most steps have, without a system of six unknowns.
 //
-// With W = H Hᵀ (3 × 3) and y = Hᵀ f it is u = W f + b. Open where b_n ≥ 0; sticking where f = −W⁻¹ b lies in the cone.
-// Else it slips along some d, ‖d‖ = 1, with f_t = −μ f_n d, and u_n = 0 gives f_n = −b_n/(W_nn − μ W_ntᵀ d). What is
-// left is one equation for the angle of d, u_tᵀ d⊥ = 0, by Newton. What is found must pass the law's test as any other
-// solution; where it doesn't, or several solutions may exist (Painlevé: W_nn ≤ μ ‖W_nt‖), the general way goes on from
-// the guess.
+// With W = H Hᵀ (3 × 3) and y = Hᵀ f, the displacement is u = W f + b. There are three cases:
+// 1. The contact is open if b_n ≥ 0.
+// 2. It sticks if f = −W⁻¹ b lies in the cone.
+// 3. Otherwise it slips along a unit vector d. Then f_t = −μ f_n d, and u_n = 0 gives f_n = −b_n/(W_nn − μ W_ntᵀ d).
+//    One equation is left for the angle of d, u_tᵀ d⊥ = 0, which Newton's method solves.
+//
+// The result must pass the test of the law like any other solution. If it fails, or if several solutions may exist
+// (Painlevé: W_nn ≤ μ ‖W_nt‖), the general method continues from the guess.
 #include <cmath>
 
 #include "models/local_problem/contact_problem.hpp"
@@ -14,11 +17,12 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-// Newton doubles the digits: after a turn by less than this the next one would be below rounding.
+// Newton's method doubles the number of exact digits in each step. If d has turned by less than this (rad), the next
+// turn would be below rounding.
 constexpr double kTurned = 1e-8;
 constexpr int kMostTurns = 12;
 
-// The force of a contact that slips; zero where no direction is found.
+// Returns the force of a contact that slips; zero if no direction d was found.
 Vec3 slipping_force(const Mat3& W, const Vec3& b, double mu, const Vec3& guess) noexcept {
   const Vec2 W_nt = W.col(0).tail<2>(), b_t = b.tail<2>();
   const Eigen::Matrix2d W_tt = W.bottomRightCorner<2, 2>();

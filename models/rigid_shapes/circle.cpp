@@ -6,8 +6,9 @@
 namespace proxarm::models {
 namespace {
 
-// The root of the slope g(z) = −b_x z_y + b_y z_x − D z_x z_y between two unit vectors, counter-clockwise less than
-// half a turn apart: g ≥ 0 at `low`, g ≤ 0 at `high`. Newton's method in the angle, and halving where that leads out.
+// Returns the root of the slope g(z) = −b_x z_y + b_y z_x − D z_x z_y between the unit vectors `low` and `high`.
+// Preconditions: `high` is counter-clockwise of `low` by less than half a turn; g ≥ 0 at `low` and g ≤ 0 at `high`.
+// Method: Newton's method in the angle; if a step leaves the interval, the interval is halved.
 Vec2 root_between(const Vec2& b, double D, Vec2 low, Vec2 high, Vec2 z) noexcept {
   const auto cross = [](const Vec2& p, const Vec2& q) { return p.x() * q.y() - p.y() * q.x(); };
   for (int k = 0; k < 80; ++k) {
@@ -39,7 +40,8 @@ int highest_on_circle(const Vec2& b, double D, std::array<Vec2, 2>& out) noexcep
   const Vec2 roots(std::cbrt(a.x()), std::cbrt(a.y()));
   const double reach = std::cbrt(D);
   if (!(roots.squaredNorm() < reach * reach)) return 1;
-  // Mirrored at the y axis, b_x is turned round, and the maximum lies before the slope's lowest place.
+  // The second maximum is found in the mirror image at the y axis, where b_x has the opposite sign. In the mirror
+  // image, the maximum lies between the x axis and the place where the slope is lowest.
   const Vec2 lowest = roots.maxCoeff() > 0.0 ? Vec2(roots.normalized()) : Vec2(Vec2::Ones().normalized());
   const Vec2 mirrored(-a.x(), a.y());
   const Vec2 z = root_between(mirrored, D, Vec2::UnitX(), lowest, Vec2(D - a.x(), a.y()).normalized());

@@ -7,14 +7,16 @@
 namespace proxarm::models {
 namespace {
 
-// Where a round body lies on an end, or along the side, it rocks between two places of a rim: so far over, in radians,
-// both are held. Either keeps to its law anywhere: no place of a rim may come into the body.
+// A round body that lies on an end or along the side rocks between two places of a rim. So that both places count as
+// contacts, the direction from a place of the rim to the body may point into the side or the end by up to this angle
+// (rad). Both contacts obey their law at any angle, because no place of a rim may come into the body.
 constexpr double kNearlyLevel = 0.05;
 
 Vec3 on(const Solid::Rim& rim, const Vec2& z) noexcept { return z.x() * rim.u + z.y() * rim.v; }
 
-// A plane that leaves the largest gap lies on a face or an end, or else across a point and the side or a rim, or along
-// an edge.
+// Finds the largest gap that a plane leaves between a cylinder and points with a radius. The plane with the largest gap
+// lies on a face or an end, or between a point and the side or a rim, or along an edge. The caller passes the
+// candidates.
 class PlanesBetween {
  public:
   PlanesBetween(const Cylinder& cylinder, std::span<const Vec3> points, double radius) noexcept
@@ -62,16 +64,16 @@ class PlanesBetween {
 
 }  // namespace
 
-// The squared distance is, with P across the line and c from y to the rim's middle, |P c|² + 2 r (P c)ᵀz + r² − r²
-// (dᵀz)²: turned negative, half of it over r is circle.hpp's function with the x axis along (d_u, d_v), but for a
-// constant.
+// With P the projection perpendicular to the line, c the vector from y to the rim's centre, and r the rim's radius, the
+// squared distance of the place z on the rim from the line is |P c|² + 2 r (P c)ᵀz + r² − r² (dᵀz)². Its negative,
+// divided by 2 r, is the function f of circle.hpp plus a constant, if the x axis points along (d_u, d_v).
 int nearest_to_line(const Solid::Rim& rim, const Vec3& y, const Vec3& d, std::array<Vec2, 2>& out) noexcept {
   const Vec3 c = rim.centre - y, across = c - d * d.dot(c);
   const Vec2 along(d.dot(rim.u), d.dot(rim.v));
   const double sine = along.norm();
   const Vec2 x_axis = sine > 0.0 ? Vec2(along / sine) : Vec2(Vec2::UnitX()), y_axis(-x_axis.y(), x_axis.x());
   const Vec2 b(-across.dot(rim.u), -across.dot(rim.v));
-  // There the quadratic term belongs to y; (dᵀz)² = sine² (1 − z_y²).
+  // In these axes the quadratic term is one in z_y, because (dᵀz)² = sine² (1 − z_y²).
   const int count = highest_on_circle({x_axis.dot(b), y_axis.dot(b)}, rim.radius * sine * sine, out);
   for (int k = 0; k < count; ++k) {
     Vec2& z = out[static_cast<std::size_t>(k)];
@@ -149,7 +151,8 @@ std::optional<Meeting> meet_side(const Cylinder& cylinder, const EdgeLine& edge,
 std::optional<Meeting> meet_end(const Cylinder& cylinder, std::uint32_t end, const Vec3& p, double radius,
                                 double beside) noexcept {
   const double height = cylinder.before_end(end, p);
-  if (radius > 0.0 && height < -beside) return {};  // its middle is beside the side, or before the other end
+  // The centre of the ball is behind the end's plane: beside the side, or before the other end.
+  if (radius > 0.0 && height < -beside) return {};
   const Vec3 out = cylinder.out_of_end(end), foot = p - height * out;
   if ((foot - cylinder.rims[end].centre).norm() > cylinder.radius + beside) return {};
   return Meeting{foot, p - radius * out, out, height - radius};

@@ -10,8 +10,8 @@
 namespace proxarm::models {
 namespace {
 
-// Gift wrapping: from each face over its edges to the next. Seen along an edge of the hull all points are within half a
-// turn, so that "further out" orders them.
+// Computes the hull by gift wrapping: from each face, it goes over the face's edges to the neighbouring faces. Seen
+// along an edge of the hull, all points are within half a turn, so they can be ordered by how far out they are.
 class Wrapping {
  public:
   explicit Wrapping(const std::vector<Vec3>& points) : points_(points) {}
@@ -32,7 +32,8 @@ class Wrapping {
 
  private:
   struct Plane {
-    std::uint32_t from = 0, to = 0, third = 0;  // no point is in front of it; from and to are an edge of its face
+    // No point is in front of the plane; from and to are the ends of an edge of its face.
+    std::uint32_t from = 0, to = 0, third = 0;
   };
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(points_.size()); }
@@ -40,7 +41,8 @@ class Wrapping {
     return orientation(points_[plane.from], points_[plane.to], points_[plane.third], points_[x]);
   }
 
-  // An edge in the plane along z that all points are on one side of, and the face beside it.
+  // Finds a first edge of the hull and returns the plane of the face beside it. The edge lies in a plane parallel to z
+  // that has all points on one side.
   [[nodiscard]] std::optional<Plane> first_plane() const {
     const auto before = [&](std::uint32_t a, std::uint32_t b) {
       return std::lexicographical_compare(points_[a].data(), points_[a].data() + 3, points_[b].data(),
@@ -61,8 +63,9 @@ class Wrapping {
     for (std::uint32_t x = 0; x < size(); ++x) {
       if (orientation(points_[a], points_[*b], above, points_[x]) == 0) on.push_back(x);
     }
-    // Of these a is the first and the last one is a corner as well, but only neighbours along the outline are an edge:
-    // from a the one than which all others are on one side, seen within the plane.
+    // a is the first of these points, and therefore a corner of their outline. The outline's edges connect neighbouring
+    // corners. The neighbour of a is the point for which all other points are on one side of the line from a through
+    // it, seen within the plane.
     const std::optional<std::uint32_t> off = off_plane(a, *b, above);
     if (!off) return {};
     const std::uint32_t to = next_corner(a, on, *off);
@@ -76,7 +79,7 @@ class Wrapping {
     return {};
   }
 
-  // The plane to the left of an edge that leaves all points behind.
+  // Returns the plane to the left of an edge that has all points behind it.
   [[nodiscard]] Plane over(std::uint32_t from, std::uint32_t to) const {
     std::optional<std::uint32_t> third;
     for (std::uint32_t x = 0; x < size(); ++x) {
@@ -86,8 +89,9 @@ class Wrapping {
     return {from, to, third.value_or(from)};
   }
 
-  // Of points in one plane, of which `at` is a corner of their outline: the next one, counter-clockwise as seen from
-  // where `behind` isn't; on a line the last.
+  // Returns the corner after `at` on the outline of points that lie in one plane: counter-clockwise, as seen from the
+  // side of the plane opposite to `behind`. If several points lie on the outline's line from `at`, the furthest of them
+  // is returned. Precondition: `at` is a corner of the outline.
   [[nodiscard]] std::uint32_t next_corner(std::uint32_t at, const std::vector<std::uint32_t>& on,
                                           std::uint32_t behind) const {
     std::uint32_t next = at;

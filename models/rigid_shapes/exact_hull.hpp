@@ -1,5 +1,6 @@
-// The convex hull of points, exact: as polygons of points that are in one plane to the last bit. What a scanner or a
-// file of seven digits leaves of a flat side becomes several faces that are nearly in one plane.
+// Computes the convex hull of points exactly: its faces are polygons of points that lie in one plane to the last bit. A
+// flat side that was scanned, or read from a file with seven digits, therefore becomes several faces that lie nearly in
+// one plane.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +10,8 @@
 
 namespace proxarm::models {
 
-// Of each face its corners, counter-clockwise from outside. None: the points are in one plane. Precondition: each
-// coordinate is zero or between 1e-60 and 1e60 in magnitude, and no point is there twice.
+// Returns the corners of each face, counter-clockwise as seen from outside; empty if all points lie in one plane.
+// Preconditions: each coordinate is zero or between 1e-60 and 1e60 in magnitude, and no two points are equal.
 std::vector<std::vector<std::uint32_t>> faces_of_hull(const std::vector<Vec3>& points);
 
 }  // namespace proxarm::models

@@ -16,7 +16,8 @@ Vec3 furthest_of(const Tool& tool, const Vec3& direction) {
     }
   };
   const auto take_part = [&](const auto& shape, const Pose& X) {
-    if constexpr (requires { shape.points_m; }) {  // no hull is needed
+    // No hull is needed: the furthest point of a hull is one of its points.
+    if constexpr (requires { shape.points_m; }) {
       for (const Vec3& p : shape.points_m) take(X * p);
     } else {
       const Solid solid = solid_of(shape, X);

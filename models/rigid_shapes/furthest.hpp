@@ -1,4 +1,4 @@
-// Where a tool ends in a direction.
+// Finds where a tool ends in a given direction.
 #pragma once
 
 #include "models/geometry/geometry.hpp"
@@ -6,7 +6,8 @@
 
 namespace proxarm::models {
 
-// The place of a tool that is furthest along a direction (unit). Throws as solid_of(). Precondition: it has a part.
+// Returns the point of a tool that is furthest along `direction` (a unit vector). Throws as solid_of() does.
+// Precondition: the tool has a part.
 Vec3 furthest_of(const Tool& tool, const Vec3& direction);
 
 }  // namespace proxarm::models

@@ -13,7 +13,7 @@ std::array<Vec3, 3> sides_of(const std::array<Vec3, 3>& triangle) noexcept {
           (triangle[0] - triangle[2]).normalized()};
 }
 
-// The points of `a` along n.
+// Returns how far the points of `a` reach along n.
 double furthest(const Vec3& n, std::span<const Vec3> a) noexcept {
   double out = -std::numeric_limits<double>::infinity();
   for (const Vec3& p : a) out = std::max(out, n.dot(p));
@@ -24,10 +24,11 @@ const Vec3& furthest_of(const Vec3& n, std::span<const Vec3> a) noexcept {
   return *std::max_element(a.begin(), a.end(), [&n](const Vec3& p, const Vec3& q) { return n.dot(p) < n.dot(q); });
 }
 
-// Looks for a plane that leaves a gap, from one that doesn't: where the points that are nearest along it lie past each
-// other, it is turned until they don't, like a mirror between the two (Chung and Wang, 1996). Where the bodies are
-// apart by more than they are far from touching elsewhere, a few turns do. `try_along` is told each plane and how far
-// `a` reaches along it; true ends the search.
+// Looks for a plane that leaves a gap between a and b, beginning with the normal n of a plane that leaves none. Each
+// turn takes the furthest point of a along n and the furthest point of b against n. If these points lie past each
+// other, n is reflected like in a mirror between the points, so that they no longer do (Chung and Wang, 1996). If the
+// bodies are clearly apart, a few turns are enough. `try_along` gets each normal and how far a reaches along it; if it
+// returns true, the search ends.
 template <typename Try>
 bool seek_plane(Vec3 n, std::span<const Vec3> a, std::span<const Vec3> b, Try try_along) noexcept {
   constexpr int most_turns = 32;
@@ -42,19 +43,22 @@ bool seek_plane(Vec3 n, std::span<const Vec3> a, std::span<const Vec3> b, Try tr
   return false;
 }
 
-// The points of another body beyond those of `a`, along n, if nothing of `a` is further along n than `own`.
+// Returns the gap between a body and the points b, along n. Precondition: `own` is the largest nᵀp of the body's points
+// p.
 double gap_beyond(double own, const Vec3& n, std::span<const Vec3> b) noexcept { return -furthest(-n, b) - own; }
 
-// Whether a plane with this normal may lie on a convex body along one of its edges: between those of the faces beside
-// it. Elsewhere the edge isn't furthest along n, and the gap that counts is another plane's. Without faces it may.
+// True if a plane with the normal n may lie on a convex body along one of its edges, that is, if n lies between the
+// normals of the faces beside the edge. For other n the edge isn't furthest along n, and another plane leaves the gap
+// that counts. An edge without faces allows any n.
 bool holds_along(const Solid::Edge& edge, const Vec3& along, const Vec3& n) noexcept {
   if (edge.left.isZero(0.0)) return true;
   const double turn = edge.left.cross(edge.right).dot(along);
   return turn * edge.left.cross(n).dot(along) >= 0.0 && turn * n.cross(edge.right).dot(along) >= 0.0;
 }
 
-// Tries the planes along two unit directions. Parallel ones have no plane of their own. Below a millionth of a radian
-// the faces beside them are as good: the gap along a direction changes by the solids' sizes times the angle.
+// Tries the two normals that are perpendicular to two unit directions. Parallel directions define no such normal. Below
+// an angle of a millionth of a radian, the planes of the faces beside the edges are accurate enough: the gap along a
+// direction changes by at most the solids' size times the angle.
 template <typename Try>
 void across(const Vec3& own, const Vec3& other, Try try_along) noexcept {
   const Vec3 n = own.cross(other);
@@ -70,7 +74,8 @@ double to_segment(const Vec3& p, const Vec3& from, const Vec3& to) noexcept {
   return (p - from - s * along).norm();
 }
 
-// Where the nearest points of the lines lie inside of both segments, they are nearest; otherwise an end is.
+// Returns the distance of two segments. If the nearest points of the two lines lie inside both segments, these points
+// are nearest; otherwise an end of a segment is.
 double between_segments(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) noexcept {
   double least = std::min({to_segment(a, c, d), to_segment(b, c, d), to_segment(c, a, b), to_segment(d, a, b)});
   const Vec3 u = b - a, v = d - c, n = u.cross(v), w = c - a;
@@ -117,15 +122,17 @@ Separation separation_from_triangle(const Solid& a, const Pose& X, const std::ar
   const std::array<Vec3, 3> b = {to_a * triangle[0], to_a * triangle[1], to_a * triangle[2]};
   const std::array<Vec3, 3> sides = sides_of(b);
   const Vec3 normal = sides[0].cross(sides[1]).normalized();
-  Separation largest{-std::numeric_limits<double>::infinity(), normal};  // (its normal is the solid's until the end)
+  // (the normal is in the frame of a until the end)
+  Separation largest{-std::numeric_limits<double>::infinity(), normal};
   const auto is_enough = [&](const Vec3& n, double own) {
-    if (!(n.squaredNorm() > 1.0 - 1e-6)) return false;  // of a needle that rounding leaves no plane
+    if (!(n.squaredNorm() > 1.0 - 1e-6)) return false;  // a needle-shaped triangle, for which rounding leaves no plane
     const double gap = gap_beyond(own, n, b);
     if (gap > largest.gap) largest = {gap, n};
     return gap > enough;
   };
   const auto told = [&]() -> Separation { return {largest.gap, X.linear() * largest.normal}; };
-  // Of the many that are apart most are by these planes, dearest last.
+  // Most pairs that are apart are separated by one of the following planes. The planes are tried in the order of their
+  // cost, the cheapest first.
   for (const Vec3& n : {normal, Vec3(-normal)}) {
     if (is_enough(n, furthest(n, a.points))) return told();
   }

@@ -1,4 +1,5 @@
-// How deep two convex solids are in each other, for figures and for the start of a session; 𝒢 never lets them.
+// Computes how deep two convex bodies overlap, or how large a gap a plane leaves between them. It is used for reports,
+// at the start of a session and to test the result of a step; 𝒢 itself doesn't let bodies overlap.
 #pragma once
 
 #include <array>
@@ -7,27 +8,29 @@
 
 namespace proxarm::models {
 
-// The largest gap that a plane leaves between the hulls of their points, over the planes that may leave the largest:
-// the faces of both, and those along an edge of each. Below 0 the hulls overlap, and this is the shortest way, turned
-// negative, by which one gets out of the other. Above 0 it is their distance or less. A plane that leaves more than
-// `enough` ends the search: nothing larger is told then. `X` leads from the frame of `a` to that of `b`. Precondition:
-// one of them has faces.
+// Returns the largest gap that a plane leaves between the hulls of the points of a and b. The planes that are tried are
+// the faces of both solids and the planes along an edge of each. If the gap is negative, the hulls overlap, and its
+// absolute value is the length of the shortest way out. If it is positive, it is at most their distance. As soon as a
+// plane leaves more than `enough`, the search ends and returns the gap of this plane, which may not be the largest. `X`
+// transforms from the frame of a to the frame of b. Precondition: a or b has faces.
 double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b, double enough = 0.0) noexcept;
 
-// The plane that leaves the largest gap, by its unit normal away from the first body, in the frame of the second.
+// The plane that leaves the largest gap between two bodies. `normal` is a unit vector from the first body towards the
+// second, in the frame of the second.
 struct Separation {
   double gap = 0.0;
   Vec3 normal;
 };
-// The same of a solid with faces, without a radius, and a triangle. It counts from the triangle's nearest side, so it
-// is the way out of a surface that the solid went in by less than the triangles' size.
+// Returns the separation of a solid and a triangle, as separation_of_hulls() does. Below 0, the shortest way out may
+// lead past the triangle's nearest side. So it is the way out of a surface of triangles only if the solid has entered
+// the surface by less than the triangles' size. Precondition: the solid has faces and no radius.
 Separation separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle,
                                     double enough = 0.0) noexcept;
 
-// The same of two triangles.
+// Returns the largest gap that a plane leaves between two triangles, as separation_of_hulls() does.
 double separation_of_triangles(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b) noexcept;
 
-// The distance of a segment from a triangle; 0 where they meet.
+// Returns the distance of a segment from a triangle; 0 if they intersect.
 double distance_of_segment(const Vec3& from, const Vec3& to, const std::array<Vec3, 3>& triangle) noexcept;
 
 }  // namespace proxarm::models

@@ -44,7 +44,8 @@ Solid finished(Solid solid) {
   return solid;
 }
 
-// Gift wrapping: from each face over its edges to the next, until all edges have two.
+// Computes the hull by gift wrapping: from each face, it goes over the face's edges to the neighbouring faces, until
+// each edge has two faces.
 class Hull {
  public:
   explicit Hull(std::vector<Vec3> points) : points_(std::move(points)) {
@@ -53,8 +54,9 @@ class Hull {
       low = low.cwiseMin(p);
       high = high.cwiseMax(p);
     }
-    // Points this near to a face's plane are its corners: a million roundings. Files of seven digits have points that
-    // are further off it, and nearer than what tells one face from the next (ExactHull).
+    // Points that are at most this far from a face's plane are corners of the face; it is about a million roundings. In
+    // files of seven digits, points of a flat side may be further from the plane than this, but nearer than what
+    // distinguishes one face from the next. Such points are left to ExactHull.
     flat_ = 1e-10 * (high - low).norm();
     middle_ = Vec3::Zero();
     for (const Vec3& p : points_) middle_ += p / static_cast<double>(points_.size());
@@ -73,7 +75,7 @@ class Hull {
   }
 
  private:
-  // The supporting plane whose normal is found by tilting an axis-parallel one onto the points twice.
+  // Returns the normal of a supporting plane. It is found by tilting an axis-parallel plane onto the points twice.
   Vec3 first_plane() {
     const auto lowest = static_cast<std::uint32_t>(
         std::min_element(points_.begin(), points_.end(), [](const Vec3& a, const Vec3& b) { return a.x() < b.x(); }) -
@@ -89,9 +91,11 @@ class Hull {
     return tilted(lowest, (points_[second] - points_[lowest]).normalized(), n1);
   }
 
-  // Turns the plane through a point with normal n about an axis in it, until it meets the next points.
+  // Turns the plane through the point `at` with normal n about an axis in the plane, until the plane meets the next
+  // points. Returns the new normal.
   Vec3 tilted(std::uint32_t at, const Vec3& axis, const Vec3& n) const {
-    const Vec3 away = n.cross(axis);  // in the plane, the side that comes up
+    // Direction in the plane, perpendicular to the axis; on this side of the axis the plane turns towards the points.
+    const Vec3 away = n.cross(axis);
     double least = std::numeric_limits<double>::infinity();
     for (const Vec3& p : points_) {
       const Vec3 d = p - points_[at];
@@ -109,7 +113,8 @@ class Hull {
     for (const Solid::Edge& edge : edges_) {
       if ((edge.from == from && edge.to == to) || (edge.from == to && edge.to == from)) return;
     }
-    // Seen along the edge, the face lies to the left; the next one begins on its far side.
+    // Seen along the edge, this face lies to the left. `away` points to the far side of the edge, where the next face
+    // begins.
     const Vec3 axis = (points_[from] - points_[to]).normalized();
     const Vec3 away = n.cross(axis);
     double most = -std::numeric_limits<double>::infinity();
@@ -117,7 +122,8 @@ class Hull {
     for (const Vec3& p : points_) {
       const Vec3 d = p - points_[from], across = d - axis * axis.dot(d);
       if (across.norm() <= flat_ || std::abs(n.dot(d)) <= flat_) continue;
-      // The neighbour's plane leaves all points behind: the one that is seen at the flattest angle beyond the edge.
+      // The plane of the next face has all points behind it. So it goes through the point that is seen at the flattest
+      // angle beyond the edge.
       const double angle = std::atan2(n.dot(d), away.dot(d));
       const double turned = angle <= -std::numbers::pi + 1e-12 ? std::numbers::pi : angle;
       if (turned > most) {
@@ -130,7 +136,7 @@ class Hull {
     edges_.push_back({from, to, n, add_face(next.normalized())});
   }
 
-  // The face in a plane's direction, new or old; its exact normal.
+  // Returns the exact normal of the face whose normal is about `normal`. Adds the face if it is new.
   Vec3 add_face(const Vec3& normal) {
     for (const Solid::Face& face : faces_) {
       if ((face.normal - normal).norm() < 1e-7) return face.normal;
@@ -156,7 +162,7 @@ class Hull {
     return exact;
   }
 
-  // The convex outline in the plane (Andrew's monotone chain), counter-clockwise about the normal.
+  // Returns the convex outline of points in a plane (Andrew's monotone chain), counter-clockwise about the normal.
   std::vector<std::uint32_t> outline(std::vector<std::uint32_t> on, const Vec3& normal) const {
     const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
     const auto at = [&](std::uint32_t j) { return Eigen::Vector2d(u.dot(points_[j]), v.dot(points_[j])); };
@@ -215,12 +221,14 @@ class Hull {
   std::vector<Solid::Edge> edges_;
 };
 
-// A body that is thinner than this share of its size is none: points in one plane, rounded.
+// If a body is thinner than this share of its size, it isn't a solid: its points lie in one plane, except for rounding.
 constexpr double kThin = 1e-9;
-// And a face that is narrower than this has no normal of its own: its corners are on a line, rounded.
+// If a face is narrower than this share of the body's size, it has no normal of its own: its corners lie on a line,
+// except for rounding.
 constexpr double kNeedle = 1e-12;
 
-// Of points that are nearly in one plane, too far off it to be taken for corners of one face.
+// Builds a solid from points of which some lie nearly in one plane, but too far from it to count as corners of one
+// face.
 class ExactHull {
  public:
   explicit ExactHull(std::vector<Vec3> points) : points_(std::move(points)) {
@@ -258,13 +266,14 @@ class ExactHull {
       left_of_[{from, to}] = i;
     }
     const double width = area.norm() / longest.norm();
-    // Rounding of a narrow one's area must turn it about its length only.
+    // Rounding in the area vector of a narrow face may turn the normal only about the face's longest edge. So the
+    // component along this edge is removed.
     for (int k = 0; k < 2; ++k) area -= area.dot(longest) / longest.squaredNorm() * longest;
     normals_.push_back(area.normalized());
     if (!(width > kNeedle * size_)) needles_.emplace_back(width, i);
   }
 
-  // Between the normals beyond its two longest edges.
+  // Sets the normal of a narrow face to lie between the normals of the faces beyond its two longest edges.
   void lean_on_neighbours(std::size_t face) {
     const std::vector<std::uint32_t>& ring = rings_[face];
     std::vector<std::pair<double, std::size_t>> beyond;
@@ -307,7 +316,7 @@ class ExactHull {
   std::vector<std::vector<std::uint32_t>> rings_;
   std::vector<Vec3> normals_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> left_of_;  // the face to the left of an edge
-  std::vector<std::pair<double, std::size_t>> needles_;                     // width, face
+  std::vector<std::pair<double, std::size_t>> needles_;                     // width and index of each narrow face
   Solid solid_;
 };
 
@@ -365,7 +374,7 @@ double reach_of(const Tool& tool) {
   for (const ToolPart& part : tool.parts) {
     std::visit(
         [&](const auto& shape) {
-          if constexpr (requires { shape.points_m; }) {  // no hull is needed for its reach
+          if constexpr (requires { shape.points_m; }) {  // the reach of a hull is that of its points
             for (const Vec3& p : shape.points_m) reach = std::max(reach, (part.X_TP * p).norm());
           } else {
             reach = std::max(reach, solid_of(shape, part.X_TP).reach);

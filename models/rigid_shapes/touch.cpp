@@ -6,12 +6,13 @@
 namespace proxarm::models {
 namespace {
 
-// A rim whose lowest point is lower than its middle by less is level: a tenth of what a gap may be short of.
+// A rim is level if its lowest point is below its centre by less than this. It is a tenth of the gap tolerance
+// (kGap_m).
 constexpr double kLevel_m = 1e-13;
-// Up to this angle, in radians, more than the lowest point of a rim is held.
+// If a rim is tilted by at most this angle (rad), four points of it are held instead of only the lowest.
 constexpr double kNearlyLevel = 0.05;
 
-// Where a hollow sphere is nearest, as a side.
+// Returns the tangent plane of a hollow sphere at the point nearest to p, as a flat side.
 FlatSide side_of(const HollowSphere& hollow, const Vec3& p) noexcept {
   const Vec3 out = p - hollow.centre;
   const double distance = out.norm();
@@ -19,25 +20,27 @@ FlatSide side_of(const HollowSphere& hollow, const Vec3& p) noexcept {
   return {n, n.dot(hollow.centre) - hollow.radius};
 }
 
-// A quarter of what a gap may be short of.
+// If the sag of a crossing is at most this, the crossing doesn't count. It is a quarter of the gap tolerance (kGap_m).
 constexpr double kSag_m = 2.5e-13;
-// Up to so many times that a crossing gives way to the ends, or a tool would go to and fro between both.
+// From a sag of kSag_m up to this many times kSag_m, a crossing gives way to the ends gradually. With a sudden change,
+// a tool would go to and fro between the crossing and the ends.
 constexpr double kSagFades = 10.0;
-constexpr double kMaySag = 1e-4;  // of sine²
+// Largest sine² of the angle between two edges at which a crossing may give way to the ends.
+constexpr double kMaySag = 1e-4;
 
 double in_unit(double s) noexcept { return std::clamp(s, 0.0, 1.0); }
 
 struct Crossing {
   Vec3 own = Vec3::Zero(), other = Vec3::Zero();
-  Vec3 across = Vec3::Zero();  // own × other, not normalised
+  Vec3 across = Vec3::Zero();  // direction of `own` × direction of `other`, not normalised
 };
 
-// The nearest points of two lines, if they lie on both segments.
+// Returns the nearest points of two lines; nullopt if one of the points lies beyond its segment by more than `beside`.
 std::optional<Crossing> cross(const EdgeLine& own, const EdgeLine& other, double beside) noexcept {
   const Vec3 a = own.to - own.from, b = other.to - other.from, d = other.from - own.from;
   const Vec3 n = a.cross(b);
   const double aa = a.squaredNorm(), bb = b.squaredNorm(), nn = n.squaredNorm();
-  // Parallel within 1e-7 rad: their ends decide, with faces.
+  // The edges are parallel within 1e-7 rad: their ends, together with faces, determine the contact.
   if (nn <= 1e-14 * aa * bb) return {};
   const double s = d.cross(b).dot(n) / nn, t = d.cross(a).dot(n) / nn;
   const double slack_s = beside / std::sqrt(aa), slack_t = beside / std::sqrt(bb);
@@ -99,8 +102,10 @@ int nearest_of_rim(const HollowSphere& hollow, const Solid::Rim& rim, const Vec2
   return nearest_of_rim(side_of(hollow, rim.centre), rim, level, out);
 }
 
-// The squared distance from the axis a is |P c|² + 2 r (c_u, c_v)ᵀz + r² − r² ((a_u, a_v)ᵀz)², with P across the axis
-// and z the place on the rim in u and v: half of it, over r, is circle.hpp's f with the y axis along (a_u, a_v).
+// With P the projection perpendicular to the axis a, c the vector from the axis to the rim's centre, r the rim's radius
+// and z the place on the rim in u and v, the squared distance from the axis is |P c|² + 2 r (c_u, c_v)ᵀz + r² − r²
+// ((a_u, a_v)ᵀz)², where c_u and c_v are the components of P c. Divided by 2 r, this is the function f of circle.hpp
+// plus a constant, if the y axis points along (a_u, a_v).
 int nearest_of_rim(const HollowTube& hollow, const Solid::Rim& rim, const Vec2& /*level*/,
                    std::array<Vec3, 4>& out) noexcept {
   const Vec3 a = (hollow.to - hollow.from).normalized(), c = rim.centre - hollow.from, across = c - a * a.dot(c);

@@ -8,13 +8,13 @@
 namespace proxarm::models {
 namespace {
 
-// A place on a circle, and the way along it per radian.
+// A place on a circle, and the derivative of the place by the angle.
 struct OnRim {
-  Vec3 arm = Vec3::Zero();  // unit
+  Vec3 arm = Vec3::Zero();  // unit vector from the centre to the place
   Vec3 x = Vec3::Zero(), along = Vec3::Zero();
 };
 
-// Looks around a rim; their cosines and sines.
+// Samples around a rim: the cosines and sines of their angles.
 constexpr std::size_t around = 32;
 constexpr double step = 2.0 * std::numbers::pi / static_cast<double>(around);
 const std::array<Vec2, around>& looks() noexcept {
@@ -39,17 +39,18 @@ double nearest_angle(const Solid::Rim& rim, const Vec3& p) noexcept {
   return std::atan2(rim.v.dot(p - rim.centre), rim.u.dot(p - rim.centre));
 }
 
-// How far a point is beyond a rim, in its plane.
+// Returns how far a point is outside a rim, measured in the rim's plane; negative inside.
 double beyond_rim(const Solid::Rim& rim, const Vec3& p) noexcept {
   const Vec3 d = p - rim.centre;
   return std::hypot(rim.u.dot(d), rim.v.dot(d)) - rim.radius;
 }
 
-// Of a look around: Newton's method does the rest.
+// Number of times that the interval between two samples is halved. Newton's method does the rest.
 constexpr int kHalvings = 12;
 
-// Of two circles the places where their distance is least around, by Newton's method from a look around the smaller
-// one: places that are apart by much on it may lie next to each other on the greater one.
+// Finds the pairs of places on two circles at which their distance has a local minimum. Newton's method starts from
+// samples around the smaller circle: places that are far apart on the smaller circle may be close to each other on the
+// larger one.
 class NearRims {
  public:
   NearRims(const Solid::Rim& one, const Solid::Rim& other) noexcept
@@ -67,10 +68,10 @@ class NearRims {
       const std::size_t last = (i + around - 1) % around, next = (i + 1) % around;
       const double angle = step * static_cast<double>(i);
       if (d2[i] <= d2[last] && d2[i] <= d2[next]) settle(angle);
-      // Circles in about one plane come nearest where they cross, with a place that is far between two such.
+      // Circles nearly in one plane come nearest where they cross. Between two crossings the distance is larger.
       if (beyond[i] * beyond[next] < 0.0) settle(crossing(angle, angle + step));
-      // Where circles in about one plane cross twice between two looks, the one inside of the other but for that or
-      // outside.
+      // Circles nearly in one plane may also cross twice between two samples. Apart from the part between these
+      // crossings, the smaller circle is then on one side of the larger one.
       const double side = beyond[i] > 0.0 ? 1.0 : -1.0;
       if (side * beyond[i] <= side * beyond[last] && side * beyond[i] <= side * beyond[next]) settle_dip(angle, side);
     }
@@ -96,7 +97,8 @@ class NearRims {
     for (const double way : {-step, step}) settle(crossing(lowest, angle + way));
   }
 
-  // Of two places on the smaller circle, one inside of the other circle's cylinder and one outside.
+  // Returns an angle near the crossing between two places on the smaller circle, of which one is inside the other
+  // circle's cylinder and one is outside.
   [[nodiscard]] double crossing(double one, double other) const noexcept {
     const bool inside = beyond_rim(*a_, on_rim(*b_, one).x) < 0.0;
     for (int k = 0; k < kHalvings; ++k) {
@@ -116,7 +118,7 @@ class NearRims {
       bend(0, 0) = p.along.squaredNorm() - a_->radius * d.dot(p.arm);
       bend(1, 1) = q.along.squaredNorm() + b_->radius * d.dot(q.arm);
       bend(0, 1) = bend(1, 0) = -p.along.dot(q.along);
-      // Where it bends the other way, downhill.
+      // If the squared distance isn't convex here, the matrix is changed so that the step goes downhill.
       const double least = 0.5 * (bend.trace() - std::hypot(bend(0, 0) - bend(1, 1), 2.0 * bend(0, 1)));
       if (const double wanted = 1e-12 * bend.trace(); least < wanted) {
         bend += (std::abs(least) + 0.1 * a_->radius * b_->radius) * Eigen::Matrix2d::Identity();

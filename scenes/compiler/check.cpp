@@ -65,7 +65,7 @@ double condition(const State<N>& s) {
   return models::rounding_amplification<N>(s.contacts);
 }
 
-// 0 if the contacts can bear f within rounding, 2 (a failure) if not.
+// Returns 0 if the contacts can exert the force f within rounding, else 2 (a failure).
 template <int N>
 double outside_laws(const State<N>& s, const CheckRegion<N>& region) {
   const double viscous = region.viscous_N_per_m ? region.viscous_N_per_m(s.q) : 0.0;
@@ -124,7 +124,7 @@ class Checker {
     }
   }
 
-  // Keeps the first state of each kind.
+  // Counts a state in `sum`. Stores the text of the first state of each kind in `first`.
   void count(std::int64_t& sum, std::string& first, const State<N>& s, const std::string& more = {}) {
     if (sum++ == 0) first = s.text() + more;
   }
@@ -138,7 +138,8 @@ class Checker {
   void one() {
     ++report_.states;
     const double K = random_.log_uniform(1.0, 1e7);
-    // q must be a possible place of a proxy: let it come to rest and, in two thirds of the states, slide a little.
+    // q must be a place where a proxy can be. So the proxy comes to rest and then, in two thirds of the states, slides
+    // a little.
     const Vec<N> x = start();
     Vec<N> q = g_(K, x, g_(K, x, x));
     const int slides = static_cast<int>(random_.uniform(0.0, 3.0));
@@ -169,7 +170,7 @@ class Checker {
     const double allowed = condition(s) * 64.0 * epsilon * (sizes + f.norm() / kappa) +
                            (region_.has_coulomb_medium ? 2048.0 * epsilon * sizes : 0.0);
     const double error = (other.r - s.r).norm() / allowed;
-    // If both answers keep the laws, Coulomb's law itself has several solutions, and the algorithm is right.
+    // If both answers obey the laws, Coulomb's law itself has several solutions here, and the algorithm is right.
     const bool lawful =
         region_.bends || (region_.friction && !region_.acts_without_contact && !(outside_laws(other, region_) > 1.0));
     const std::string more = ", κ = " + std::to_string(kappa);
@@ -195,15 +196,15 @@ class Checker {
   CheckReport report_;
 };
 
-// The point of the proxy's space nearest to x.
+// Returns the point of the proxy's space that is nearest to x.
 Vec3 onto(const Space& space, const Vec3& x_W) {
   if (space.dimensions == 3) return x_W;
   const auto axes = space.axes.leftCols(space.dimensions);
   return space.origin_m + axes * (axes.transpose() * (x_W - space.origin_m));
 }
 
-// Points of the proxy's space just outside of an object's surface, near enough for states to push onto it. Found by
-// Newton steps along the gradient of the distance.
+// Returns points of the proxy's space just outside of an object's surface, near enough that states can push onto it.
+// The points are found by Newton steps along the gradient of the distance.
 std::vector<Vec3> around(const Object& object, const Space& space, Random& random, int count, double deepest_m) {
   const Vec3 middle = middle_of(object.shape);
   const double size = size_of(object.shape);
@@ -218,7 +219,7 @@ std::vector<Vec3> around(const Object& object, const Space& space, Random& rando
         const Vec3 axis = space.dimensions == 3 ? Vec3(Vec3::Unit(a)) : Vec3(space.axes.col(a));
         slope += (distance_to(object, x + h * axis) - d) / h * axis;
       }
-      // In a space that cuts the object, the gradient is shorter than one.
+      // If the space cuts the object, the gradient within the space is shorter than one.
       x -= (d - off) / (space.dimensions == 3 ? 1.0 : std::max(slope.squaredNorm(), 0.1)) * slope;
       if (std::abs(d - off) < 0.1 * off) break;
     }
@@ -227,8 +228,8 @@ std::vector<Vec3> around(const Object& object, const Space& space, Random& rando
   return places;
 }
 
-// Free points of a guide, half of them within 2 mm of an object. Found from random points by steps along the guide,
-// each as long as the clearance.
+// Returns free points of a guide, half of them within 2 mm of an object. The points are found from random points by
+// steps along the guide; the length of each step is the clearance.
 std::vector<Vec3> on_guide(const Scene& scene, const Clearances& clearances, Random& random) {
   GuideDescription guide = guide_in_space(scene);
   if (scene.space.dimensions < 3) {
@@ -272,7 +273,7 @@ CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, con
     region.friction->push_back(object.friction);
     region.soft = region.soft || object.layer.has_value();
   }
-  // Contacts don't report the friction region of a mesh, so its friction counts as unknown.
+  // Contacts don't report the friction region of a mesh, so the friction of a mesh with regions counts as unknown.
   const auto has_regions = [](const Object& object) { return !object.friction_regions.empty(); };
   if (std::any_of(scene.objects.begin(), scene.objects.end(), has_regions)) region.friction.reset();
   region.touches = !scene.objects.empty() && !scene.guide;
@@ -295,12 +296,12 @@ CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, con
   }
   region.bends = scene.guide && scene.guide->kind == GuideDescription::Kind::polyline;
   if (scene.guide) region.centre = compiled.from_W<N>(scene.guide->points_m.front());
-  // A proxy reaches a guide before it meets objects.
+  // With a guide, states start on the guide, because a proxy is on it before it meets objects.
   Random random(options.seed);
   const bool guided = scene.guide && !scene.objects.empty();
   const Clearances clearances(scene);
   for (const Vec3& x : guided ? on_guide(scene, clearances, random) : places) {
-    // Use only places outside of all other objects.
+    // Use only places that are outside of all objects.
     if (clearances.of_point(x) >= 0.0) region.places.push_back(compiled.from_W<N>(x));
   }
   return Checker<N>(g, region, options).run();
@@ -389,7 +390,7 @@ template CheckReport check_algorithm<3>(models::GeometricAlgorithm<3>&, const Ch
 
 namespace {
 
-// Smallest radius of the round solid objects; infinite without any.
+// Returns the smallest radius of the round solid objects; infinity if there are none.
 double least_radius_m(const Scene& scene) {
   double least = infinity;
   for (const Object& object : scene.objects) {

@@ -1,14 +1,10 @@
-// Samples random states of a 𝒢 and checks Assumption 1 and the laws that its forces obey.
+// Samples random states of a 𝒢 and checks Assumption 1 and the laws that its forces must obey:
 //
-//   independent of K   if r = 𝒢(K, r − f/K, q), then r = 𝒢(κ, r − f/κ, q) for other κ too (Assumption 1)
-//   within its laws    f is a sum of forces that the reported contacts can bear, as in (17)
-//   rests where it is  𝒢(K, r, r) = r: r isn't inside an object, and no force pulls it
+//   independent of K   if r = 𝒢(K, r − f/K, q), then r = 𝒢(κ, r − f/κ, q) for any other κ too (Assumption 1)
+//   within its laws    f is a sum of forces that the reported contacts can exert, as in (17)
+//   rests where it is  𝒢(K, r, r) = r: r isn't inside an object, and no force pulls at the proxy
 //   repeatable         the same arguments give the same point, independent of earlier steps
-//   finite             no NaN, no infinity
-//
-//   MyWorld g;                                                        // your own 𝒢, in three dimensions
-//   const CheckReport report = check_algorithm<3>(g, {.centre = {0, 0, 0}, .size_m = 0.5}, {});
-//   if (!report.passed()) std::puts(report.text().c_str());
+//   finite             the result contains no NaN and no infinity
 #pragma once
 
 #include <cstdint>
@@ -24,60 +20,64 @@ namespace proxarm::scenes {
 
 struct CheckOptions {
   std::uint64_t seed = 1;
-  std::int64_t states = 20'000;  // for each object, and for the whole scene
-  double kappa_decades = 6.0;    // on either side of K
-  // Largest depth of p below q, for any κ. check_scene() limits it to a tenth of the smallest radius: beyond, curved
-  // worlds have several solutions.
+  std::int64_t states = 20'000;  // number of states for each object, and for the whole scene
+  double kappa_decades = 6.0;    // the range of κ extends by this many decades below and above K
+  // Largest depth of p below q, for any κ. check_scene() limits it to a tenth of the smallest radius, because a deeper
+  // p in a curved world can have several solutions.
   double deepest_m = 0.02;
-  double most_s_per_state = 250e-6;  // average of real time; if states take longer, fewer are tried
-  double several_allowed = 0.02;     // share of states with several or no solutions above which the verdict isn't fine
+  // Limit for the mean real time per state; if states take longer, fewer states are tried.
+  double most_s_per_state = 250e-6;
+  // Largest share of states with several or no solutions for which the verdict is still fine.
+  double several_allowed = 0.02;
 };
 
-// Where to sample states, and properties of the world there.
+// Where to sample states, and which properties the world has there.
 template <int N>
 struct CheckRegion {
   models::Vec<N> centre = models::Vec<N>::Zero();
-  double size_m = 0.5;                            // half-width
-  std::vector<models::Vec<N>> places{};           // free points to start from; empty: anywhere in the box
-  std::optional<std::vector<double>> friction{};  // μ by object; nullopt: only checks that forces don't pull
-  bool acts_without_contact = false;              // a field, a Coulomb medium or a guide
-  // Stiffness that viscous media add to the coupling at q: b/T, N/m. Their force isn't a contact force.
+  double size_m = 0.5;                   // half the width of the box around `centre`
+  std::vector<models::Vec<N>> places{};  // free points from which states start; empty: anywhere in the box
+  // μ of each object; nullopt: only checks that forces don't pull.
+  std::optional<std::vector<double>> friction{};
+  bool acts_without_contact = false;  // there is a field, a Coulomb medium or a guide
+  // Stiffness in N/m that viscous media add to the coupling at q: b/T. The force of these media isn't a contact force.
   std::function<double(const models::Vec<N>& q)> viscous_N_per_m{};
   // There is a Coulomb medium. Whether the proxy sticks in it, and how far a short slip goes, is extrapolated from
-  // samples at 4 % of the way to p or less (models/surfaces/coulomb_step.hpp), which amplifies rounding by the inverse
-  // of that share.
+  // samples at 4 % or less of the way to p (models/surfaces/coulomb_step.hpp). The extrapolation amplifies rounding by
+  // the inverse of that share.
   bool has_coulomb_medium = false;
-  bool bends = false;    // there is a polyline: near a corner, a point on the other segment may also be a solution
-  bool touches = false;  // states start at objects: without a contact there is no verdict
-  bool soft = false;     // there is an elastic layer: nothing rests within it without a force
+  bool bends = false;    // there is a polyline; near a corner of it, a point on the other segment may be a solution too
+  bool touches = false;  // states start at objects; without a contact there is no verdict
+  bool soft = false;     // there is an elastic layer; nothing rests within it without a force
 };
 
 struct CheckFigure {
   std::string what;
-  double worst = 0.0;  // largest error relative to the rounding allowance: up to 1 is fine
+  double worst = 0.0;  // largest error divided by the rounding allowance: up to 1 is fine
   std::int64_t failures = 0;
   std::string state;  // the state with the largest error
 };
 
-// several_solutions is no error: Coulomb's law may have several solutions, and the one found may depend on K. Also, the
-// path over a mesh's faces may end elsewhere with another K, although Assumption 1 doesn't hold there.
+// several_solutions isn't an error, for two reasons. Coulomb's law may have several solutions, and which of them is
+// found may depend on K. Over the faces of a mesh, the proxy's path may end at another place with another K, because
+// Assumption 1 doesn't hold there.
 enum class CheckVerdict : std::uint8_t { fine, several_solutions, untouched, wrong };
 
 struct CheckReport {
   std::string subject;
   std::int64_t states = 0, in_contact = 0, slipping = 0;
-  std::int64_t asked = 0;  // states requested; fewer were tried if states < asked
+  std::int64_t asked = 0;  // number of states requested; if it is larger than `states`, fewer were tried
   double seconds = 0.0;
-  bool expects_contact = false;                             // without a contact there is no verdict
-  std::int64_t several = 0;                                 // states with several solutions
-  std::int64_t ways = 0;                                    // states whose path over a mesh's faces depends on K
-  std::int64_t unresolved = 0;                              // states without an answer that keeps all laws
-  std::string several_state, ways_state, unresolved_state;  // the first of each
-  double several_allowed = 0.0;                             // largest share of each among all states
+  bool expects_contact = false;  // without a contact there is no verdict
+  std::int64_t several = 0;      // number of states with several solutions
+  std::int64_t ways = 0;         // number of states whose path over a mesh's faces depends on K
+  std::int64_t unresolved = 0;   // number of states without an answer that obeys all laws
+  std::string several_state, ways_state, unresolved_state;  // text of the first state of each of these three kinds
+  double several_allowed = 0.0;  // largest share of all states that each of these three kinds may have
   std::vector<CheckFigure> figures;
 
   [[nodiscard]] CheckVerdict verdict() const noexcept;
-  [[nodiscard]] std::string text() const;  // a few lines for the user
+  [[nodiscard]] std::string text() const;  // a few lines of text for the user
 };
 
 template <int N>
@@ -90,7 +90,8 @@ extern template CheckReport check_algorithm<2>(models::GeometricAlgorithm<2>&, c
 extern template CheckReport check_algorithm<3>(models::GeometricAlgorithm<3>&, const CheckRegion<3>&,
                                                const CheckOptions&);
 
-// Checks each object alone, if there are several, and then all together. Moving objects are checked at rest, at time 0.
+// If the scene has several objects, checks each object alone and then all objects together. Moving objects are checked
+// at rest, at time 0.
 std::vector<CheckReport> check_scene(const Scene& scene, const CheckOptions& options = {});
 
 }  // namespace proxarm::scenes

@@ -16,13 +16,13 @@ bool is_open_mesh(const Object& object) {
   return shape != nullptr && !shape->mesh->closed();
 }
 
-// The inverse of an object's motion since it was described.
+// Returns the inverse of an object's motion from its described place.
 Pose back_to_description(const Object& object, double time_s) {
   const bool moves = object.motion && !object.motion->driven;
   return moves ? script_of(*object.motion).at(time_s).inverse(Eigen::Isometry) : Pose::Identity();
 }
 
-// True if an open mesh lies between the two.
+// True if an open mesh lies between x and y.
 bool separates(const Object& object, const Vec3& x, const Vec3& y) {
   return is_open_mesh(object) && std::get<MeshShape>(object.shape).mesh->first_hit(x, y).any();
 }
@@ -38,7 +38,7 @@ Clearances::Clearances(const Scene& scene) : objects_(scene.objects) {
       others_.push_back(i);
       continue;
     }
-    // Slightly enlarged, for rounding.
+    // The box is slightly larger than the object, because of rounding.
     const Vec3 middle = middle_of(object.shape), reach = Vec3::Constant(1.000001 * size_of(object.shape));
     leaves.push_back({{middle - reach, middle + reach}, i});
   }

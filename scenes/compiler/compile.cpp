@@ -42,10 +42,10 @@ bool has_friction(const Object& object) {
                                               [](const FrictionRegion& region) { return region.friction > 0.0; });
 }
 
-// ---- Choice
+// ---- Which 𝒢 is built
 
-// Both sides of a mesh hold the proxy, and a moving mesh must not pass it. A stop on a line is nearer to the mesh than
-// that allows.
+// Throws SetupError if a mesh moves beside a guide along a line. Both sides of a mesh hold the proxy, so a moving mesh
+// must not pass it. A stop on a line comes nearer to the mesh than this requires.
 void require_no_moving_mesh(const Scene& scene) {
   for (const Object& object : scene.objects) {
     if (!object.motion || !std::holds_alternative<MeshShape>(object.shape)) continue;
@@ -74,11 +74,12 @@ Plan::Contacts contacts_of(const Scene& scene, const Plan& plan, const Cut<N>& c
   if (cut.planes.size() == 1) {
     return N > 1 && object_at(scene, cut.planes.front().object).friction > 0.0 ? friction_plane : plane;
   }
-  // A tree can't help, as flat surfaces are unbounded; checking each of up to 64 is quick.
+  // A tree can't help here, because flat surfaces are unbounded. Checking each of up to 64 surfaces is fast.
   return cut.planes.size() <= 64 ? planes : world;
 }
 
-// Objects that the space doesn't meet don't count.
+// Counts what the plan reports: surfaces, layers, moving objects and friction. Objects that the space doesn't meet
+// don't count.
 template <int N>
 void count(const Scene& scene, const Cut<N>& cut, Plan& plan) {
   bool friction = plan.guide && plan.guide->friction > 0.0;
@@ -86,11 +87,11 @@ void count(const Scene& scene, const Cut<N>& cut, Plan& plan) {
     const Object& object = object_at(scene, index);
     plan.layers += object.layer ? 1 : 0;
     plan.moving += object.motion ? 1 : 0;
-    // With a guide along a line, no other friction acts: there is only one direction, and an object in it stops the
-    // proxy.
+    // With a guide along a line, objects have no friction: there is only one direction, and an object in this direction
+    // stops the proxy.
     if (plan.contacts != Plan::Contacts::guide_among_objects) friction = friction || has_friction(object);
   };
-  // Rigid and at rest, so it doesn't matter that several faces name the same object.
+  // These objects are rigid and at rest, so it doesn't matter that several faces belong to one object.
   for (const auto& plane : cut.planes) meets(plane.object);
   for (const Ball& ball : cut.balls) meets(ball.object);
   for (const Solid& solid : cut.solids) {
@@ -99,11 +100,11 @@ void count(const Scene& scene, const Cut<N>& cut, Plan& plan) {
   }
   plan.surfaces += cut.planes.size() + cut.balls.size();
   if (plan.contacts == Plan::Contacts::mesh) meets(0);
-  if (plan.contacts == Plan::Contacts::world && plan.guide) plan.surfaces += 2;  // see add_plane_guide()
+  if (plan.contacts == Plan::Contacts::world && plan.guide) plan.surfaces += 2;  // add_plane_guide() adds two
   if (friction) plan.friction = N > 1 ? Plan::Friction::acts : Plan::Friction::no_tangent;
 }
 
-// The object of all contacts, if there is only one.
+// Returns the object to which all contacts belong; nullopt if there are several.
 template <int N>
 std::optional<std::int32_t> only_object(const Plan& plan, const Cut<N>& cut) {
   if (plan.contacts == Plan::Contacts::mesh) return 0;
@@ -133,7 +134,7 @@ Plan plan_of(const Scene& scene, std::optional<GuideDescription> guide, const Cu
   return plan;
 }
 
-// ---- Construction
+// ---- How it is built
 
 template <int N>
 Algorithm<N> in_space(SpaceAlgorithm lifted) {
@@ -152,7 +153,8 @@ Algorithm<N> friction_plane(const Scene& scene, const HalfSpace<N>& plane, Compi
   return wall;
 }
 
-// Friction of an object in the space: a line has no tangent to slip along.
+// Returns the friction of an object in the space. On a line it is 0, because a line has no tangent along which the
+// proxy could slip.
 template <int N>
 double friction_in_space(const Scene& scene, std::int32_t object) {
   return N > 1 ? object_at(scene, object).friction : 0.0;
@@ -169,7 +171,7 @@ SpaceAlgorithm plane_composition(const Scene& scene, const Cut<N>& cut, Compiled
   if (N == 1) return composition;
   std::int32_t last = -1;
   for (const auto& plane : cut.planes) {
-    if (std::exchange(last, plane.object) == plane.object) continue;  // once per object
+    if (std::exchange(last, plane.object) == plane.object) continue;  // one setter per object
     out.friction_setters.emplace_back(plane.object, [planes = composition.get(), object = plane.object](double mu) {
       planes->set_friction(object, mu);
     });
@@ -177,7 +179,7 @@ SpaceAlgorithm plane_composition(const Scene& scene, const Cut<N>& cut, Compiled
   return composition;
 }
 
-// A mesh as the whole scene, without a World.
+// Renders a mesh that is the whole scene, without a World.
 SpaceAlgorithm mesh_surface(const Scene& scene, CompiledScene& out) {
   const Object& object = scene.objects.front();
   auto surface = std::make_unique<models::MeshSurface>(std::get<MeshShape>(object.shape).mesh, object.friction,
@@ -200,17 +202,18 @@ std::unique_ptr<models::Obstacle> moved(const Scene& scene, std::int32_t index, 
   return driven;
 }
 
-// A guide on a plane among objects: the half-spaces on both its sides, reported as one more object.
+// Adds a guide on a plane among objects: two half-spaces, one on each side of the plane, which are reported as one more
+// object.
 void add_plane_guide(const GuideDescription& guide, std::int32_t index, Entries& entries) {
   for (const double side : {1.0, -1.0}) {
     auto half =
         std::make_unique<models::PlaneObstacle>(guide.points_m.front(), Vec3(side * guide.direction), guide.friction);
-    half->set_slack(8.0);  // a point on either surface is behind the other one by the rounding of both
+    half->set_slack(8.0);  // a point on one of the two surfaces may be behind the other one by the rounding of both
     entries.push_back({std::move(half), index, side > 0.0 ? 0 : 1});
   }
 }
 
-// The obstacles of a World, one for each surface.
+// Returns the obstacles of a World, one for each surface.
 template <int N>
 Entries entries_of(const Scene& scene, Cut<N> cut, CompiledScene& out) {
   Entries entries;
@@ -238,7 +241,7 @@ template <int N>
 SpaceAlgorithm world(const Scene& scene, Cut<N> cut, CompiledScene& out) {
   Entries entries = entries_of<N>(scene, std::move(cut), out);
   for (const models::World::Entry& entry : entries) {
-    // Friction by triangle can't be changed.
+    // Friction that differs by triangle can't be changed.
     if (N == 1 || !object_at(scene, entry.object).friction_regions.empty()) continue;
     out.friction_setters.emplace_back(entry.object,
                                       [obstacle = entry.obstacle.get()](double mu) { obstacle->set_friction(mu); });
@@ -273,7 +276,7 @@ SpaceAlgorithm guide_among_objects(const Scene& scene, Cut<N> cut, CompiledScene
   return std::make_unique<models::PolylineGuide>(std::move(guide));
 }
 
-// nullptr if there is nothing to touch.
+// Returns the 𝒢 of the contacts; nullptr if there is nothing to touch.
 template <int N>
 Algorithm<N> contacts(const Scene& scene, Cut<N> cut, CompiledScene& out) {
   switch (out.plan.contacts) {
@@ -332,7 +335,7 @@ CompiledScene compile(const Scene& scene) {
   CompiledScene out;
   out.name = scene.name;
   out.source = std::make_shared<const Scene>(scene);
-  // Three dimensions use W's coordinates.
+  // In three dimensions, the coordinates are those of W.
   if (scene.space.dimensions < 3) out.space = scene.space;
   for (const Object& object : scene.objects) out.frictions.push_back(object.friction);
   switch (scene.space.dimensions) {

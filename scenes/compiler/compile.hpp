@@ -1,5 +1,5 @@
-// Compiles a scene to the smallest 𝒢 that renders it. A scene without friction gets no friction code; a single wall is
-// just (2) or (4); an empty scene is 𝒢(K, p, q) = p.
+// Compiles a scene to the smallest 𝒢 that renders it. A scene without friction gets no code for friction, a single wall
+// is just (2) or (4), and an empty scene is 𝒢(K, p, q) = p.
 //
 //   CompiledScene world = compile(load_scene("scenes/wall.yaml"));
 //   GeometricAlgorithm<3>& g = world.algorithm<3>();
@@ -27,34 +27,35 @@ struct CompiledScene {
 
   std::string name;
   Space space;
-  Plan plan;                            // what it was built from
-  std::shared_ptr<const Scene> source;  // to compile it again for another proxy
+  Plan plan;                            // the plan from which it was built
+  std::shared_ptr<const Scene> source;  // needed to compile the scene again for another proxy
   std::variant<Algorithm<1>, Algorithm<2>, Algorithm<3>> any_algorithm;
 
   [[nodiscard]] int dimensions() const noexcept { return space.dimensions; }
 
-  // The scene's 𝒢. Precondition: N is the scene's number of dimensions (else throws std::bad_variant_access). Each
-  // proxy needs its own CompiledScene, since 𝒢 remembers contacts.
+  // Returns the scene's 𝒢. Precondition: N is the scene's number of dimensions; otherwise throws
+  // std::bad_variant_access. Each proxy needs its own CompiledScene, because 𝒢 remembers contacts.
   template <int N>
   [[nodiscard]] models::GeometricAlgorithm<N>& algorithm() const {
     return *std::get<Algorithm<N>>(any_algorithm);
   }
 
-  // Moves an object whose motion is `driven` (by its index in the scene) to X, relative to its described place. Call
-  // once before each step: the proxy feels the motion since the last call. In fewer dimensions, only the part of X
-  // along the space counts.
+  // Moves an object whose motion is `driven` to the pose X relative to its described place. `object` is its index in
+  // the scene. Must be called once before each step: the proxy feels the motion since the call before. In fewer than
+  // three dimensions, only the part of X along the space counts.
   void drive(std::size_t object, const models::Pose& X) noexcept;
   std::vector<std::pair<std::int32_t, models::MovingObstacle*>> driven;  // parts of any_algorithm
-  // Also called with the motion: for 𝒢 of a rigid tool.
+  // drive() passes each motion to this function too, for the 𝒢 of a rigid tool.
   std::function<void(std::int32_t object, const models::Pose& X)> also_drive;
 
-  // Sets an object's friction from the next step on. Precondition: has_friction(), finite and not negative.
+  // Sets an object's friction from the next step on. Preconditions: has_friction(object); `friction` is finite and not
+  // negative.
   void set_friction(std::size_t object, double friction) noexcept;
   [[nodiscard]] bool has_friction(std::size_t object) const noexcept;
-  std::vector<double> frictions;                                                       // of all objects, as described
+  std::vector<double> frictions;  // friction of each object, as described
   std::vector<std::pair<std::int32_t, std::function<void(double)>>> friction_setters;  // parts of any_algorithm
 
-  // Converts between coordinates of the space and points of W.
+  // Convert between coordinates of the space and points of W.
   template <int N>
   [[nodiscard]] models::Vec3 to_W(const models::Vec<N>& x) const noexcept {
     return space.origin_m + space.axes.leftCols<N>() * x;
@@ -65,8 +66,8 @@ struct CompiledScene {
   }
 };
 
-// Throws description::SetupError for a scene that can't be rendered, such as a space of fewer dimensions inside an
-// object.
+// Throws description::SetupError if the scene can't be rendered, for example if a space of fewer than three dimensions
+// lies inside an object.
 CompiledScene compile(const Scene& scene);
 
 }  // namespace proxarm::scenes

@@ -40,8 +40,8 @@ void cut_sphere(const Scene& scene, std::int32_t index, const SphereShape& spher
                        sphere.inside_out});
 }
 
-// True if the object consists of rigid planes at rest or, with N < 3, is a rigid sphere at rest. Then its section has
-// been added to the cut.
+// Adds the object's section to the cut if the object consists of rigid planes at rest or, with N < 3, is a rigid sphere
+// at rest. True if it was added.
 template <int N>
 bool cut_plain(const Scene& scene, std::int32_t index, Cut<N>& cut) {
   const Object& object = scene.objects[static_cast<std::size_t>(index)];

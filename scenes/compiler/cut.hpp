@@ -1,5 +1,5 @@
-// The part of a scene within the proxy's space, sorted by how it is rendered. In three dimensions that is the whole
-// scene; in fewer, sections (section.hpp).
+// The part of a scene that lies within the proxy's space, sorted by how it is rendered. In three dimensions this is the
+// whole scene; in fewer dimensions it consists of sections (section.hpp).
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,16 @@
 
 namespace proxarm::scenes {
 
-// A plane of W, cut by the proxy's space: a half-space of fewer dimensions.
+// A half-space of the proxy's space: the section of a plane's half-space in W.
 template <int N>
 struct HalfSpace {
-  std::int32_t object = 0;   // index in the scene
-  std::int32_t feature = 0;  // of the object
+  std::int32_t object = 0;   // index of the object in the scene
+  std::int32_t feature = 0;  // index of the feature of the object
   models::Vec<N> point = models::Vec<N>::Zero();
   models::Vec<N> normal = models::Vec<N>::Zero();
 };
 
-// A sphere, cut by the space: a sphere of fewer dimensions.
+// The section of a sphere: a sphere of fewer dimensions.
 struct Ball {
   std::int32_t object = 0;
   models::Vec3 centre = models::Vec3::Zero();  // in coordinates of the space, padded with zeros
@@ -27,26 +27,27 @@ struct Ball {
   bool inside_out = false;
 };
 
-// Any other object, in its described place, in coordinates of the space.
+// Any other object, in its described place and in coordinates of the space.
 struct Solid {
   std::int32_t object = 0;
-  std::vector<Part> parts;  // empty if the space doesn't meet it
+  std::vector<Part> parts;  // empty if the space doesn't meet the object
 };
 
 template <int N>
 struct Cut {
-  std::vector<HalfSpace<N>> planes;  // flat, rigid and at rest, including faces of boxes seen from inside
-  std::vector<Ball> balls;           // rigid spheres at rest; only with N < 3
+  // Flat surfaces that are rigid and at rest, including the faces of boxes seen from inside.
+  std::vector<HalfSpace<N>> planes;
+  std::vector<Ball> balls;  // rigid spheres at rest; only with N < 3
   std::vector<Solid> solids;
   std::vector<std::int32_t> missed;                           // objects that the space doesn't meet
-  std::vector<std::pair<std::int32_t, std::int32_t>> joined;  // pairs of flush objects (seams.hpp)
+  std::vector<std::pair<std::int32_t, std::int32_t>> joined;  // pairs of flush objects that act as one (seams.hpp)
 };
 
-// The only object of a scene, if it is a mesh at rest without a layer; else nullptr. In three dimensions such a mesh is
-// rendered directly, without an obstacle or a Solid.
+// Returns the only object of a scene if it is a mesh at rest without a layer; else nullptr. In three dimensions such a
+// mesh is rendered directly, without an obstacle or a Solid.
 const MeshShape* lone_mesh(const Scene& scene);
 
-// Throws SetupError if an object can't be cut; see section.hpp.
+// Throws SetupError if the section of an object can't be rendered; see section.hpp.
 template <int N>
 Cut<N> cut_by_space(const Scene& scene);
 extern template Cut<1> cut_by_space<1>(const Scene&);

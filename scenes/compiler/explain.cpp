@@ -15,7 +15,8 @@ namespace {
 using models::Vec;
 using models::Vec3;
 
-// Time of one step: the median over blocks of steps in which p moves by about a micrometre, as at 1 kHz.
+// Returns the time of one step in ns: the median over blocks of steps. In these steps, p moves by about a micrometre,
+// as it does at 1 kHz.
 template <int N>
 double median_ns(models::GeometricAlgorithm<N>& g, const Vec<N>& q_start, const Vec<N>& push) {
   constexpr int blocks_measured = 41, steps_measured = 500;
@@ -38,7 +39,7 @@ StepCost measure(const Scene& scene) {
   models::GeometricAlgorithm<N>& g = compiled.algorithm<N>();
   g.set_time({.time_s = 0.0, .period_s = 1e-3});
   StepCost cost;
-  // Free steps start from the point near the objects with the largest clearance.
+  // Steps without contact start from the point near the objects that has the largest clearance.
   Vec<N> clear = Vec<N>::Zero();
   double room = -1.0;
   const Clearances clearances(scene);
@@ -54,8 +55,8 @@ StepCost measure(const Scene& scene) {
     }
   }
   if (scene.objects.empty() || room > 1e-3) cost.free_ns = median_ns<N>(g, clear, Vec<N>::Zero());
-  // Steps in contact: moves the proxy in various directions until it meets a surface, then presses it by 5 µm, as 5 N
-  // do at 1 kg and 1 kHz.
+  // Steps in contact: the proxy moves in various directions until it meets a surface. It is then pressed by 5 µm, as 5
+  // N do at 1 kg and 1 kHz.
   for (int i = 0; i < 200 && !scene.objects.empty() && !(cost.contact_ns > 0.0); ++i) {
     Vec<N> direction;
     for (int a = 0; a < N; ++a) direction[a] = std::sin(2.0 + 78.233 * (i + 1) * (a + 1));
@@ -71,7 +72,7 @@ StepCost measure(const Scene& scene) {
 }
 
 struct Radius {
-  // Smallest radius of convex curvature; 0 if there is none.
+  // Returns the smallest radius of convex curvature; 0 if the shape has no convex curvature.
   double operator()(const SphereShape& s) const { return s.inside_out ? 0.0 : s.radius_m; }
   double operator()(const CapsuleShape& s) const { return s.inside_out ? 0.0 : s.radius_m; }
   double operator()(const CylinderShape& s) const { return s.inside_out ? 0.0 : s.radius_m; }
@@ -107,7 +108,7 @@ std::string explain(const Scene& scene) {
     if (radius > 0.0 && (!(sharpest > 0.0) || radius < sharpest)) sharpest = radius;
   }
   if (sharpest > 0.0) {
-    // On convex curvature, the work of the environment per step is at most f_n ‖∇q‖²/(2R).
+    // On convex curvature, the environment does a work of at most f_n ‖∇q‖²/(2R) per step.
     out << "note\n  on its sharpest outside (radius " << sharpest
         << " m) (26) gains speed at the rate T f_n/(M R): " << 100.0 * 1e-3 * 5.0 / sharpest
         << " %/s at 1 ms, 5 N and 1 kg; a damping of T f_n/R cancels it, " << 1e-3 * 5.0 / sharpest

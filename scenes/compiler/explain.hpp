@@ -1,4 +1,4 @@
-// Describes what a scene compiles to, what each step skips and why, and the time of a step on this machine.
+// Describes what a scene compiles to, what each step skips and why, and how long a step takes on this machine.
 #pragma once
 
 #include <string>
@@ -8,14 +8,15 @@
 namespace proxarm::scenes {
 
 struct StepCost {
-  double free_ns = 0.0;     // median of a step without contact; 0 if there is no free place
-  double contact_ns = 0.0;  // median of a step on a surface; 0 without one
+  double free_ns = 0.0;     // median time of a step without contact; 0 if there is no free place
+  double contact_ns = 0.0;  // median time of a step on a surface; 0 if there is no surface
 };
 
-// Takes some 20 ms, with a copy of the world.
+// Measures a step with a copy of the world. Takes about 20 ms.
 StepCost measure_step(const Scene& scene);
 
-// All of this as text for the user, with a note on curved surfaces at first order (see docs/scenes.md).
+// Returns the description as text for the user. On curved surfaces it has a note on steps of first order (see
+// docs/scenes.md).
 std::string explain(const Scene& scene);
 
 }  // namespace proxarm::scenes

@@ -10,12 +10,11 @@ namespace {
 
 using models::Vec3;
 
-// The normals in which an object can be pressed, whether several act at once, and whether they represent all
-// directions.
+// The normals along which an object can be pressed.
 struct Normals {
   std::vector<Vec3> lines_W;
-  bool any_direction = false;  // they represent all directions
-  bool together = false;       // several at once: the corner of a cavity
+  bool any_direction = false;  // `lines_W` represents all directions
+  bool together = false;       // several normals act at once, as in the corner of a cavity
 };
 
 Normals everywhere() {
@@ -45,7 +44,7 @@ bool turns(const Object& object) {
   return object.motion && (object.motion->driven || object.motion->turn_rad_per_s != 0.0);
 }
 
-// Projects to the scene's space and drops duplicates.
+// Projects the lines to the scene's space and drops duplicates.
 std::vector<Vec3> within(const Space& space, const std::vector<Vec3>& lines_W) {
   constexpr double least = 1e-6, same = 1.0 - 1e-9;
   const auto axes = space.axes.leftCols(space.dimensions);
@@ -80,7 +79,7 @@ std::vector<Layered> layered_objects(const Scene& scene) {
   return all;
 }
 
-// Whether two solids may overlap, judged by bounding spheres. A moving object may be anywhere.
+// True if two solids may overlap, judged by their bounding spheres. A moving object is assumed to be anywhere.
 bool may_overlap(const Object& a, const Object& b) {
   if (a.motion || b.motion || is_inside_out(a.shape) || is_inside_out(b.shape)) return true;
   const auto* plane_a = std::get_if<PlaneShape>(&a.shape);
@@ -124,7 +123,7 @@ void add_pair(const Layered& a, const Layered& b, Touches& to) {
   }
 }
 
-// Only flat faces: the pairs of a round shape already cover its triples.
+// Adds triples of flat faces only. For a round shape, the pairs already represent its triples.
 void add_triple(const Layered& a, const Layered& b, const Layered& c, Touches& to) {
   if (a.normals.any_direction || b.normals.any_direction || c.normals.any_direction) return;
   for (const Vec3& l : a.normals.lines_W) {
@@ -143,7 +142,7 @@ double stiffness(const LayersTogether& touch) {
 }  // namespace
 
 std::vector<LayersTogether> layer_touches(const Scene& scene, std::size_t most) {
-  constexpr std::size_t most_objects = 24;  // more would give thousands of triples
+  constexpr std::size_t most_objects = 24;  // more objects would give thousands of triples
   const std::vector<Layered> all = layered_objects(scene);
   Touches touches;
   add_singles(all, touches);

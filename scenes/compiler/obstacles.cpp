@@ -28,7 +28,7 @@ std::vector<Part> one(std::unique_ptr<models::Obstacle> obstacle) {
 struct MakeParts {
   double mu;
   Layer layer;
-  std::vector<double> mu_of_face{};  // of a mesh
+  std::vector<double> mu_of_face{};  // friction of each face of a mesh
 
   std::vector<Part> operator()(const PlaneShape& s) const {
     return one(std::make_unique<models::PlaneObstacle>(s.point_m, s.normal, mu, layer));
@@ -86,7 +86,7 @@ struct Distance {
     const double across = (d - e * e.dot(d)).norm() - s.radius_m;
     return side(s.inside_out, std::hypot(std::max(z, 0.0), std::max(across, 0.0)) + std::min(0.0, std::max(z, across)));
   }
-  // An open mesh has no inside: its distance is never negative.
+  // An open mesh has no inside, so its distance is never negative.
   double operator()(const MeshShape& s) const {
     std::uint32_t near = 0;
     const double distance = s.mesh->distance(x, std::numeric_limits<double>::infinity(), near);
@@ -115,7 +115,8 @@ struct Size {
   double operator()(const MeshShape& s) const { return 0.5 * (s.mesh->bounds().high - s.mesh->bounds().low).norm(); }
 };
 
-// The cavity that remains when an inside-out object's layer is fully compressed: its walls recede by the thickness.
+// Returns the cavity that remains when the layer of an inside-out object is fully compressed: the walls recede by the
+// layer's thickness.
 struct StandBack {
   double by_m;
 
@@ -142,7 +143,7 @@ struct StandBack {
   Shape operator()(MeshShape s) const { return s; }
 };
 
-// Thickness of the solid under a layer; 0 if the shape can't have a layer.
+// Returns the thickness of the solid under a layer; 0 if the shape can't have a layer.
 struct Thickness {
   static constexpr double kEndless = std::numeric_limits<double>::infinity();
 
@@ -180,7 +181,7 @@ Layer layer_on(const Scene& scene, const Object& object, double thickness_m, con
 }
 
 std::vector<Part> parts_of(const Scene& scene, const Object& object) {
-  // A mesh's faces are exact on both sides; a layer would make them inexact.
+  // A mesh can't have a layer: the faces of a mesh are exact on both sides, and a layer would make them inexact.
   const double thickness = std::visit(Thickness{}, object.shape);
   const Layer layer =
       layer_on(scene, object, thickness,

@@ -12,39 +12,40 @@
 
 namespace proxarm::scenes {
 
-// One obstacle of an object. A box or cylinder seen from inside consists of several.
+// One obstacle of an object. A box or cylinder seen from inside consists of several parts.
 struct Part {
   std::unique_ptr<models::Obstacle> obstacle;
-  std::int32_t feature = -1;  // feature reported by contacts; −1: the obstacle's own
+  std::int32_t feature = -1;  // feature that contacts report; −1: the obstacle's own feature
 };
 
-// The parts of an object in its described place, in W. Throws SetupError for a layer on a mesh, and for a layer too
-// thick for its object.
+// Returns the parts of an object in its described place, in W. Throws SetupError if a mesh has a layer, or if a layer
+// is too thick for its object.
 std::vector<Part> parts_of(const Scene& scene, const Object& object);
 
-// The error to throw for something at `line` of the scene that can't be rendered.
+// Returns the error to be thrown if something at `line` of the scene can't be rendered.
 description::SetupError refusal(const Scene& scene, int line, std::string message, std::string advice);
 
-// The object's layer; {} if it has none. `thickness_m`: thickness of the solid below the layer, 0 if it can't have one.
-// Throws SetupError with `expected` if the layer is at least half as thick.
+// Returns the object's layer; {} if it has none. `thickness_m` is the thickness of the solid below the layer, 0 if the
+// object can't have a layer. Throws SetupError with `expected` if the layer's thickness is at least half of it.
 models::Layer layer_on(const Scene& scene, const Object& object, double thickness_m, const std::string& expected);
 
-// Friction by face of a mesh with regions; empty for other objects. Throws SetupError for a region without a triangle.
+// Returns the friction of each face for a mesh with regions; empty for other objects. Throws SetupError if a region
+// contains no triangle.
 std::vector<double> friction_by_face(const Scene& scene, const Object& object);
 
-// The shape as a region of space: solid, without friction.
+// Returns the shape as a solid region of space, without friction.
 std::unique_ptr<models::Obstacle> region_of(const Shape& shape);
 
 models::ScriptedMotion script_of(const Motion& motion);
 
-// Centre of a shape, and its approximate reach from there (half a metre for a plane).
+// Return the centre of a shape, and its approximate reach from the centre (half a metre for a plane).
 models::Vec3 middle_of(const Shape& shape);
 double size_of(const Shape& shape);
 
-// True if the shape is a cavity that holds tool or proxy inside.
+// True if the shape is a cavity that holds the tool or proxy inside.
 bool is_inside_out(const Shape& shape);
 
-// Signed distance to the rigid part of an object in its described place.
+// Returns the signed distance of x_W to the rigid part of an object in its described place.
 double distance_to(const Object& object, const models::Vec3& x_W);
 
 }  // namespace proxarm::scenes

@@ -15,9 +15,9 @@ using models::Mat3;
 using models::Pose;
 using models::Vec3;
 
-// How far a bridge reaches into either solid, and beyond its ends if the solids continue there.
+// How far a bridge reaches into each of its two solids, and beyond its ends if the solids continue there.
 constexpr double reach_m = 1e-3;
-// Decimal sizes aren't exact: a gap of 1 µm may be stored as slightly more.
+// Decimal numbers aren't exact in binary: a gap of 1 µm may be stored as slightly more.
 constexpr double within_m = joined_m * (1.0 + 1e-6);
 
 bool joins(const Object& object) {
@@ -26,7 +26,7 @@ bool joins(const Object& object) {
          std::holds_alternative<PlaneShape>(object.shape);
 }
 
-// The axes of b expressed in a, as a signed permutation; nullopt if they aren't parallel.
+// Returns the axes of b in the frame of a, as a signed permutation; nullopt if the axes aren't parallel.
 std::optional<Mat3> turned_alike(const BoxShape& a, const BoxShape& b) {
   const Mat3 R = a.pose_W.linear().transpose() * b.pose_W.linear();
   const Mat3 P = R.array().round();
@@ -35,7 +35,7 @@ std::optional<Mat3> turned_alike(const BoxShape& a, const BoxShape& b) {
   return P;
 }
 
-// A box in the frame of another box with parallel edges.
+// The extent of a box in the frame of another box with parallel edges.
 struct Extent {
   Vec3 low, high;
 };
@@ -55,7 +55,8 @@ BoxShape as_box(const Pose& frame, const Extent& extent) {
   return box;
 }
 
-// The axis along which faces of the two are in contact, if their other extents overlap.
+// Returns the axis along which faces of a and b are in contact while a and b overlap along the other axes; nullopt if
+// there is none.
 std::optional<int> shared_axis(const Extent& a, const Extent& b) {
   for (int k = 0; k < 3; ++k) {
     const bool touch = std::abs(a.high[k] - b.low[k]) <= within_m || std::abs(b.high[k] - a.low[k]) <= within_m;
@@ -78,7 +79,8 @@ class Joiner {
   }
 
   Joined join() {
-    // A moved face may meet a third one, which meets a fourth: at most as many rounds as solids.
+    // A face that was moved may meet a third face, which may meet a fourth. So levelling is repeated, at most once per
+    // solid.
     for (std::size_t round = 0; round < solids_.size() && level_all(); ++round) {
     }
     for_pairs([this](std::size_t i, std::size_t j) { bridge(i, j); });
@@ -101,7 +103,7 @@ class Joiner {
               [this](std::size_t a, std::size_t b) { return bounds_[a].first < bounds_[b].first; });
   }
 
-  // Visits all pairs of solids whose bounds overlap along x.
+  // Calls `visit` for all pairs of solids whose bounds overlap along x.
   template <typename Visit>
   void for_pairs(const Visit& visit) {
     for (std::size_t k = 0; k < solids_.size(); ++k) {
@@ -113,7 +115,7 @@ class Joiner {
     }
   }
 
-  // Removes steps of less than joined_m. True if there were any.
+  // Removes steps of less than joined_m between faces. True if there were any.
   bool level_all() {
     bool changed = false;
     for_pairs([&](std::size_t i, std::size_t j) {
@@ -138,7 +140,7 @@ class Joiner {
     if (!axis) return false;
     bool steps = (a.pose_W.linear() * *P - b.pose_W.linear()).norm() > 0.0;
     bool a_grows = false;
-    // Smaller differences are rounding.
+    // Differences below this are rounding, not steps.
     const double rounding = 1e-15 * (a.pose_W.translation().norm() + b.pose_W.translation().norm() + of_b.high.norm());
     const auto put = [&](double& one, double& other, double outer) {
       if (std::abs(one - other) > within_m || std::abs(one - other) <= rounding) return;
@@ -157,7 +159,7 @@ class Joiner {
     return true;
   }
 
-  // True if the cylinders are coaxial and an end of one touches an end of the other.
+  // True if the cylinders are coaxial and an end of a touches an end of b.
   static bool ends_on(const CylinderShape& a, const CylinderShape& b) {
     const Vec3 e = (a.to_m - a.from_m).normalized();
     const auto off_axis_m = [&](const Vec3& x) { return (x - a.from_m - e * e.dot(x - a.from_m)).norm(); };
@@ -193,7 +195,7 @@ class Joiner {
     add(i, j, as_box(a.pose_W, shared));
   }
 
-  // Bridges a box and the plane it stands on.
+  // Bridges a box and the plane on which it stands.
   void bridge_box_to_plane(std::size_t i, std::size_t plane, const Vec3& n, const Vec3& point) {
     const BoxShape& box = std::get<BoxShape>(objects_[i].shape);
     const Vec3 n_box = box.pose_W.linear().transpose() * n;
@@ -227,7 +229,7 @@ class Joiner {
     return {std::pair{c.from_m, c.to_m}, std::pair{c.to_m, c.from_m}};
   }
 
-  // Bridges a cylinder's end and a box's face or another cylinder's end that contains it.
+  // Bridges the end of a cylinder and the face of a box, or the end of another cylinder, that contains this end.
   void bridge_end(std::size_t i, std::size_t other) {
     const CylinderShape& cylinder = std::get<CylinderShape>(objects_[i].shape);
     for (const auto& [end, far_end] : ends(cylinder)) {
@@ -266,7 +268,7 @@ class Joiner {
     add(i, with, disc);
   }
 
-  // Extends a bridge beyond its ends where the solids continue, so that bridges meeting at a corner overlap.
+  // Extends a bridge beyond its ends where the solids continue, so that bridges that meet at a corner overlap.
   void lengthen(const Pose& frame, int across, double reach, Extent& bridge) const {
     for (const int k : {(across + 1) % 3, (across + 2) % 3}) {
       for (const bool high : {true, false}) {
@@ -279,8 +281,8 @@ class Joiner {
     }
   }
 
-  // True if the box's corners and the points between them, slightly inwards, are within solids. `across` the seam it
-  // skips the middle, where a gap may be.
+  // True if the box's corners and the points between them, moved slightly inwards, lie within solids. Along the axis
+  // `across` the seam, the middle is skipped, because a gap may be there.
   [[nodiscard]] bool solid_throughout(const Pose& frame, int across, const Extent& extent) const {
     const Vec3 middle = 0.5 * (extent.low + extent.high), half = 0.5 * (extent.high - extent.low);
     for (int corner = 0; corner < 27; ++corner) {
@@ -307,8 +309,8 @@ class Joiner {
   }
 
   std::vector<Object> objects_;
-  std::vector<std::size_t> solids_, planes_;       // indices; solids sorted along x
-  std::vector<std::pair<double, double>> bounds_;  // of each solid along x
+  std::vector<std::size_t> solids_, planes_;       // indices in objects_; solids are sorted along x
+  std::vector<std::pair<double, double>> bounds_;  // bounds of each solid along x
   std::vector<Seam> seams_;
 };
 

@@ -22,12 +22,12 @@ using models::Pose;
 using models::Vec3;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// Up to this angle (rad), two directions count as parallel or perpendicular. A space's axes must be perpendicular to
-// the same accuracy. Users write up to six digits; a larger value would hide errors that can be felt.
+// Up to this angle (rad), two directions count as parallel or perpendicular. The axes of a space must be perpendicular
+// to the same accuracy. Users write up to six digits; a larger tolerance would hide errors that can be felt.
 constexpr double straight = 1e-6;
 
-// Up to this distance from the space, metres, a guide's point counts as lying in it. An arm's accuracy is about as
-// large.
+// Up to this distance from the space (metres), a point of a guide counts as lying in the space. The accuracy of an arm
+// is of about the same size.
 constexpr double beside_m = 1e-6;
 
 std::string in_dimensions(const Scene& scene) {
@@ -35,14 +35,15 @@ std::string in_dimensions(const Scene& scene) {
                                                           : std::to_string(scene.space.dimensions) + " dimensions");
 }
 
-// The point of the space nearest to x_W, in coordinates of the space.
+// Returns the point of the space that is nearest to x_W, in coordinates of the space.
 Vec3 nearest_in(const Space& space, const Vec3& x_W) noexcept {
   Vec3 x = space.axes.transpose() * (x_W - space.origin_m);
   for (int k = space.dimensions; k < 3; ++k) x[k] = 0.0;
   return x;
 }
 
-// The part of a vector along the space, in its coordinates; `rest` becomes the length of the part across it.
+// Returns the part of a vector along the space, in coordinates of the space. `rest` becomes the length of the part
+// perpendicular to the space.
 Vec3 along(const Space& space, const Vec3& v_W, double& rest) noexcept {
   Vec3 v = space.axes.transpose() * v_W;
   double out = 0.0;
@@ -64,14 +65,14 @@ struct Interval {
   }
 };
 
-// The t for which |u + t d| ≤ half.
+// Returns the interval of t in which |u + t d| ≤ half.
 Interval within_slab(double u, double d, double half) {
   if (d == 0.0) return std::abs(u) <= half ? Interval{} : Interval{0.0, 0.0};
   const double s = -(u + half) / d, t = (half - u) / d;
   return {std::min(s, t), std::max(s, t)};
 }
 
-// The t for which ‖u + t d‖ ≤ R.
+// Returns the interval of t in which ‖u + t d‖ ≤ R.
 Interval within_radius(const Vec3& u, const Vec3& d, double R) {
   const double a = d.squaredNorm();
   if (!(a > 1e-24)) return u.norm() <= R ? Interval{} : Interval{0.0, 0.0};
@@ -138,7 +139,7 @@ class Section {
   std::vector<Part> operator()(const CapsuleShape& s) const {
     const models::SegmentCore core(s.from_m, s.to_m);
     if (line()) {
-      // A capsule is convex, so its interval reaches from the smallest to the largest t of its cylinder and its two
+      // A capsule is convex. So its interval reaches from the smallest to the largest t of its cylinder and of its two
       // balls.
       const Vec3 u = origin() - s.from_m, d = axis(0);
       Interval held = within_radius(u - core.e * core.e.dot(u), d - core.e * core.e.dot(d), s.radius_m);
@@ -183,7 +184,7 @@ class Section {
   [[nodiscard]] bool line() const noexcept { return scene_.space.dimensions == 1; }
   [[nodiscard]] const Vec3& origin() const noexcept { return scene_.space.origin_m; }
   [[nodiscard]] Vec3 axis(Eigen::Index k) const noexcept { return scene_.space.axes.col(k); }
-  // Coordinates of a point of W, including those across the space.
+  // Returns the coordinates of a point of W, including those perpendicular to the space.
   [[nodiscard]] Vec3 coordinates(const Vec3& x_W) const noexcept {
     const Vec3 d = x_W - origin();
     return {axis(0).dot(d), axis(1).dot(d), axis(2).dot(d)};
@@ -204,7 +205,7 @@ class Section {
                  "turn one of its axes into the space or across it, or use `dimensions: 3` with `guide: plane`");
   }
 
-  // The object's layer on a section of this thickness; 0: the section can't have a layer.
+  // Returns the object's layer on a section of this thickness; 0 means that the section can't have a layer.
   [[nodiscard]] models::Layer layer_on(double thickness_m) const {
     return scenes::layer_on(
         scene_, object_, thickness_m,
@@ -213,8 +214,8 @@ class Section {
             : "a layer on what is no mesh and, if it is solid, has its axes in the space or across it");
   }
 
-  // Section by a space that doesn't meet the solid: empty. Throws for a cavity, in which the proxy would have no free
-  // place.
+  // Returns the section by a space that doesn't meet the solid, which is empty. Throws SetupError for a cavity, because
+  // the proxy would have no free place.
   [[nodiscard]] std::vector<Part> outside(bool inside_out) const {
     if (inside_out)
       throw error("the proxy's space lies inside the object " + object_.name, "move `space` or the object");
@@ -242,7 +243,7 @@ class Section {
     return block(in_space(centre_W), R, {along, across}, inside_out);
   }
 
-  // A box so deep across the space that the proxy meets only its sides.
+  // Returns a box that is so deep perpendicular to the space that the proxy meets only its sides.
   [[nodiscard]] std::vector<Part> block(const Vec3& centre, const models::Mat3& R, const std::vector<double>& half,
                                         bool inside_out) const {
     Pose pose = Pose::Identity();
@@ -263,7 +264,7 @@ class Section {
     return parts;
   }
 
-  // The faces of a box seen from inside that meet the space.
+  // Returns those faces of a box seen from inside that meet the space.
   [[nodiscard]] std::vector<Part> room(const BoxShape& s) const {
     std::vector<Part> parts;
     std::int32_t feature = 0;
@@ -277,7 +278,7 @@ class Section {
     return parts;
   }
 
-  // An oblique cut of a box: walls on three to six segments.
+  // Returns an oblique section of a box: walls on three to six segments.
   [[nodiscard]] std::vector<Part> polygon(const BoxShape& s) const {
     models::TriangleSoup walls;
     const auto corner = [&](int axis, double first, double second, double third) {
@@ -298,7 +299,7 @@ class Section {
     return standing(std::move(walls), {});
   }
 
-  // Friction of walls by the ends of their segments, smaller end first.
+  // Friction of each wall. The key is the ends of the wall's segment, the smaller end first.
   using FrictionOfWalls = std::map<std::array<double, 4>, double>;
   static std::array<double, 4> ends_of(const Vec3& a, const Vec3& b) {
     const bool in_order = a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
@@ -311,14 +312,15 @@ class Section {
     const auto mesh = std::make_shared<const models::TriangleMesh>(std::move(walls));
     std::vector<double> by_face;
     for (std::uint32_t face = 0; face < mesh->size() && !friction.empty() && !line(); ++face) {
-      // Two corners of the triangle lie above each other; the third is at the segment's other end.
+      // Two corners of the triangle are at the same end of the segment, one above the other. The third corner is at the
+      // other end.
       const Vec3 &a = mesh->corner(face, 0), &b = mesh->corner(face, 1), &c = mesh->corner(face, 2);
       by_face.push_back(friction.at(ends_of(a, a.head<2>() == b.head<2>() ? c : b)));
     }
     return one(std::make_unique<models::MeshObstacle>(mesh, mu_, std::move(by_face)));
   }
 
-  // Adds a rectangle over the segment from a to b.
+  // Adds a rectangular wall on the segment from a to b.
   static void add_wall(const Vec3& a, const Vec3& b, const Vec3& up, models::TriangleSoup& walls) {
     if (a == b) return;
     const auto first = static_cast<std::uint32_t>(walls.vertices.size());
@@ -327,8 +329,8 @@ class Section {
     walls.triangles.push_back({first, first + 2, first + 3});
   }
 
-  // Adds the segment in which z = 0 cuts a triangle or a rectangle. A corner at z = 0 counts as above. Both faces at an
-  // edge give the same cut point, so that neighbouring walls meet exactly.
+  // Adds the segment in which the plane z = 0 cuts a triangle or a rectangle. A corner at z = 0 counts as above the
+  // plane. The two faces at an edge give the same cut point, so neighbouring walls meet exactly.
   static void add_segment(std::span<const Vec3> x, double deep, models::TriangleSoup& walls) {
     std::array<Vec3, 2> ends;
     std::size_t count = 0;
@@ -342,7 +344,7 @@ class Section {
     if (count == 2) add_wall(ends[0], ends[1], Vec3(0, 0, deep), walls);
   }
 
-  // Adds the point at which the x axis passes through the triangle, by barycentric coordinates.
+  // Adds the point at which the x axis passes through the triangle, found by barycentric coordinates.
   static void add_point(const std::array<Vec3, 3>& x, double deep, models::TriangleSoup& walls) {
     const auto area = [](const Vec3& a, const Vec3& b) { return a.y() * b.z() - a.z() * b.y(); };
     const std::array<double, 3> w{area(x[1], x[2]), area(x[2], x[0]), area(x[0], x[1])};
@@ -366,14 +368,14 @@ std::vector<Part> section_of(const Scene& scene, const Object& object) {
   return std::visit(Section(scene, object), object.shape);
 }
 
-// In coordinates ξ the half-space is n_Wᵀ(origin + A ξ − point_W) ≥ 0, so its normal is Aᵀn_W.
+// In coordinates ξ of the space, the half-space is n_Wᵀ(origin + A ξ − point_W) ≥ 0, so its normal is Aᵀn_W.
 std::optional<PlaneShape> plane_in_space(const Scene& scene, const Object& object, const PlaneShape& plane) {
   const Space& space = scene.space;
   const Vec3 n = plane.normal.normalized(), near = nearest_in(space, plane.point_m);
   double rest = 0.0;
   const Vec3 m = along(space, n, rest);
   const double height = n.dot(space.origin_m + space.axes * near - plane.point_m);
-  // A space parallel to the plane, within rounding, either doesn't meet it or lies in it.
+  // A space that is parallel to the plane, within rounding, either doesn't meet the plane or lies in it.
   if (m.norm() < 1e-12) {
     if (!(height < 0.0)) return std::nullopt;
     throw refusal(scene, object.line, "the proxy's space lies inside the object " + object.name,

@@ -20,8 +20,10 @@ const Solid::Face& nearest(const Solid& hull, const Vec3& x) {
                            [&](const Solid::Face& a, const Solid::Face& b) { return below(a, x) < below(b, x); });
 }
 
-// The depth is the minimum of linear functions of the position, one per face. Over a triangle it is at most the largest
-// value of any one of them at the corners; this uses the one that is smallest at the centre.
+// Bounds the depth of a triangle below the hull's surface. At a point, the depth is the minimum of linear functions of
+// the position, one per face of the hull. On a triangle, this minimum is at most the largest value of any one of the
+// functions at the corners. The function that is smallest at the triangle's centre is used. `there` is the depth at the
+// centre, `at_most` the bound.
 struct Depth {
   double there, at_most;
 };
@@ -40,7 +42,7 @@ std::array<Triangle, 4> quarters(const Triangle& at) {
 
 double deepest_dent_m(const models::TriangleMesh& mesh, const Solid& hull) {
   constexpr double precision = 1.01;
-  const double rounding_m = 1e-9 * hull.reach;  // including that of faces nearly in one plane
+  const double rounding_m = 1e-9 * hull.reach;  // includes the rounding of faces that lie nearly in one plane
   double deepest_m = 0.0;
   std::vector<Triangle> left;
   for (std::uint32_t face = 0; face < mesh.size(); ++face) {

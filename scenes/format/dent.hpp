@@ -1,4 +1,4 @@
-// Measures how far a mesh is from convex: the depth of its deepest dent below its convex hull.
+// Measures how far a mesh is from being convex: the depth of its deepest dent below its convex hull.
 #pragma once
 
 #include "models/mesh/mesh.hpp"
@@ -6,8 +6,8 @@
 
 namespace proxarm::scenes {
 
-// The largest distance, in metres, of a point of the mesh from the surface of its hull; at most 1 % too small. By
-// branch and bound over the triangles. Precondition: `hull` is the hull of the mesh's vertices.
+// Returns the largest distance of a point of the mesh from the surface of the hull, in metres; at most 1 % too small.
+// Method: branch and bound over the triangles. Precondition: `hull` is the convex hull of the mesh's vertices.
 double deepest_dent_m(const models::TriangleMesh& mesh, const models::Solid& hull);
 
 }  // namespace proxarm::scenes

@@ -20,13 +20,13 @@ using description::between;
 using description::YamlNode;
 using models::Vec3;
 
-// Coordinates beyond a hundred kilometres are a mistake of the unit, and their rounding (1e-11 m) would make the proxy
-// inexact.
+// Coordinates beyond a hundred kilometres are taken for a mistake in the unit. Their rounding (1e-11 m) would also make
+// the proxy inexact.
 constexpr description::Range coordinate_range = between(-1e5, 1e5);
 constexpr description::Range friction_range = between(0.0, 100.0);
-// A length below a nanometre is a mistake of the unit; an arm knows its position to micrometres.
+// A length below a nanometre is taken for a mistake in the unit; an arm knows its position only to micrometres.
 constexpr description::Range length_range = between(1e-9, 1e5);
-// Corners ten centimetres apart are never the same corner.
+// Corners that are more than ten centimetres apart can't be meant as one corner.
 constexpr description::Range weld_range = between(0.0, 0.1);
 constexpr description::Range speed_range = between(-100.0, 100.0);
 
@@ -50,7 +50,7 @@ models::Pose pose_of(const YamlNode& node) {
   pose.translation() = vector_of(node.vec3_or("position_m", {0, 0, 0}, coordinate_range));
   const Vec3 rpy =
       vector_of(node.vec3_or("rpy_rad", {0, 0, 0}, between(-2.0 * std::numbers::pi, 2.0 * std::numbers::pi)));
-  if (rpy.isZero(0.0)) return pose;  // without a rotation, coordinates stay unchanged to the bit
+  if (rpy.isZero(0.0)) return pose;  // without a rotation, coordinates stay equal to the bit
   pose.linear() = (Eigen::AngleAxisd(rpy.z(), Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vec3::UnitY()) *
                    Eigen::AngleAxisd(rpy.x(), Vec3::UnitX()))
                       .toRotationMatrix();
@@ -148,7 +148,7 @@ Motion read_motion(const YamlNode& node) {
   return motion;
 }
 
-// The shape of a region; no mesh.
+// Reads the shape of a region, which can't be a mesh.
 Shape read_region(const YamlNode& within) {
   if (within.is_map()) refuse_key(within, "mesh", "a box, sphere, capsule, cylinder or plane as a region", "a mesh");
   std::vector<std::string> solid = kinds();
@@ -191,7 +191,7 @@ Space read_space(const YamlNode& root) {
   space.origin_m = vector_of(node->vec3_or("origin_m", {0, 0, 0}, coordinate_range));
   const auto axes =
       node->list("axes", static_cast<std::size_t>(space.dimensions), static_cast<std::size_t>(space.dimensions));
-  // Gram–Schmidt orthonormalisation, for axes that are given in round numbers.
+  // Gram–Schmidt orthonormalisation, because axes in a file are rounded.
   for (int i = 0; i < space.dimensions; ++i) {
     const YamlNode& axis_node = axes[static_cast<std::size_t>(i)];
     Vec3 axis = vector_of(axis_node.as_vec3(coordinate_range));
@@ -199,15 +199,15 @@ Space read_space(const YamlNode& root) {
     for (int pass = 0; pass < 2; ++pass) {
       for (int j = 0; j < i; ++j) axis -= space.axes.col(j) * space.axes.col(j).dot(axis);
     }
-    // Axes must be at right angles to six digits. A larger deviation is a mistake rather than a rounded number, and
-    // would make distances in the space differ noticeably from those in W.
+    // Axes must be perpendicular to each other to six digits. A larger deviation is taken for a mistake, not for
+    // rounding, and would make distances in the space differ noticeably from those in W.
     if (!(axis.norm() > 0.0) || axis.norm() < length * (1.0 - 1e-6)) {
       throw axis_node.error("axes of nonzero length, at right angles to each other");
     }
     space.axes.col(i) = axis.normalized();
   }
   if (space.dimensions < 3) {
-    // The remaining axes only complete the rotation, for drawings and sections.
+    // The remaining axes only complete the rotation matrix, for drawings and sections.
     const Vec3 x = space.axes.col(0);
     if (space.dimensions == 1) space.axes.col(1) = x.unitOrthogonal();
     space.axes.col(2) = x.cross(Vec3(space.axes.col(1)));

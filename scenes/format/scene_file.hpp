@@ -8,12 +8,13 @@
 
 namespace proxarm::scenes {
 
-// Throws description::SetupError with file, line and key for invalid contents.
+// Loads a scene. Throws description::SetupError with file, line and key if the contents are invalid.
 Scene load_scene(const std::filesystem::path& file);
-// Replaces the scene's tool: an empty path means a point, the scene's file its own tool, another file its tool.
+// Loads a scene and replaces its tool. If `tool` is empty, the tool becomes a point. If `tool` is the scene's file, the
+// scene keeps its own tool. Else `tool` is a tool file.
 Scene load_scene_with(const std::filesystem::path& file, const std::filesystem::path& tool);
 
-// The same from text in memory; `file` is used in messages and for relative paths.
+// Parses a scene from text in memory. `file` is used in messages and for relative paths.
 Scene parse_scene(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace proxarm::scenes

@@ -21,7 +21,7 @@ using description::between;
 using description::YamlNode;
 using models::Vec3;
 
-// A tool larger than ten metres or smaller than a micrometre is a mistake of the unit.
+// A tool larger than ten metres or smaller than a micrometre is taken for a mistake in the unit.
 constexpr description::Range size_range = between(1e-6, 10.0);
 constexpr description::Range friction_range = between(0.0, 100.0);
 constexpr description::Range weld_range = between(0.0, 0.1);
@@ -40,8 +40,9 @@ models::Pose pose_of(const YamlNode& node) {
   return pose;
 }
 
-// Largest distance of a vertex over a face of a mesh that should be convex, whichever way its normal points. (Not a
-// depth: over a slanted face in a dent of 5 mm, a vertex may stand out by more.)
+// Returns the largest distance of a vertex above a face, for a mesh that should be convex; the direction of the face's
+// normal doesn't matter. This distance isn't the depth of a dent: above a slanted face in a dent of 5 mm, a vertex may
+// stand out by more than 5 mm.
 double stands_out_m(const models::TriangleMesh& mesh, const std::vector<Vec3>& points) {
   double deepest = 0.0;
   for (std::uint32_t face = 0; face < mesh.size(); ++face) {
@@ -79,8 +80,8 @@ models::ConvexTool read_convex(const YamlNode& node, RigidTool& tool) {
     convex.points_m.push_back(mesh->vertex(vertex));
     size_m = std::max(size_m, convex.points_m.back().norm());
   }
-  // File coordinates are rounded to 6e-8 of their size, and the plane of a slim triangle turns by some hundred times
-  // that.
+  // Coordinates in files are rounded to 6e-8 of their size. This turns the plane of a slim triangle by some hundred
+  // times that angle.
   constexpr double roundness = 1e-5;
   if (!hull && stands_out_m(*mesh, convex.points_m) > roundness * size_m) {
     const double dent_m = deepest_dent_m(*mesh, models::solid_of(convex, models::Pose::Identity()));

@@ -1,5 +1,5 @@
-// The tool that the arm holds, as in its file: shapes fixed to each other, in the tool's frame T, whose origin is the
-// rendered point. docs/tool.md describes the keys.
+// The tool that the arm holds, as its file describes it: shapes that are fixed to each other. They are in the tool's
+// frame T, whose origin is the rendered point. docs/tool.md describes the keys.
 #pragma once
 
 #include <filesystem>
@@ -15,18 +15,19 @@ class YamlNode;
 namespace proxarm::scenes {
 
 struct RigidTool {
-  std::filesystem::path file;  // for messages
+  std::filesystem::path file;  // file for messages
   int line = 0;
   std::string name;
-  models::Tool shape;                         // at least one part
-  std::vector<std::filesystem::path> meshes;  // files of its meshes, also of those used for hulls
+  models::Tool shape;                         // has at least one part
+  std::vector<std::filesystem::path> meshes;  // files of the tool's meshes, including meshes used for hulls
 };
 
-// From a tool file, or from a scene's key `tool`. Throws description::SetupError with file, line and key.
+// Load a tool from a tool file, or read it from a scene's key `tool`. Throw description::SetupError with file, line and
+// key.
 RigidTool load_tool(const std::filesystem::path& file);
 RigidTool read_tool(const description::YamlNode& node);
 
-// Keys for a tool's shape; several shapes are listed under `parts`.
+// Returns the keys that describe a tool's shape. If a tool has several shapes, they are listed under `parts`.
 const std::vector<std::string>& tool_kinds();
 
 }  // namespace proxarm::scenes

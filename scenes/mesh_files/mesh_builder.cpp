@@ -38,7 +38,7 @@ void MeshBuilder::note_written(std::string_view number) noexcept {
   if (mesh_.last_digit == 0.0 || digit < mesh_.last_digit) mesh_.last_digit = digit;
 }
 
-// Merges equal neighbours. Precondition: no corner is negative.
+// Adds a face to face_ and merges equal neighbouring corners. Precondition: no corner is negative.
 void MeshBuilder::take(std::span<const std::int64_t> corners) {
   ++mesh_.account.faces;
   face_.clear();

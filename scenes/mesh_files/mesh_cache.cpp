@@ -25,7 +25,8 @@ using models::TriangleMesh;
 using Bytes = std::span<const std::byte>;
 using Digest = Sha256::Digest;
 
-// Smallest mesh file with a cache, bytes: about 20,000 triangles. Smaller files load quickly without one.
+// Size in bytes from which on a mesh file gets a cache: about 20,000 triangles. Smaller files load fast without a
+// cache.
 constexpr std::uintmax_t kSmallest = 1'000'000;
 
 struct Header {
@@ -100,12 +101,13 @@ bool write(const Descriptor& out, Bytes bytes) {
   return true;
 }
 
-// Creates a new file. Fails if the name exists, also as a link; the existing file isn't touched.
+// Creates a new file. Fails if the name exists, even as a link; an existing file stays unchanged.
 Descriptor create(const std::string& file, ::mode_t mode) {
   return Descriptor(::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
 }
 
-// This user's secret, created if missing. nullopt if it can't be stored, or if others could read it.
+// Returns this user's secret, which is created if it is missing. nullopt if the secret can't be stored, or if others
+// could read it.
 std::optional<Digest> secret() {
   const auto folder = cache_folder();
   if (!folder) return std::nullopt;
@@ -171,7 +173,7 @@ std::optional<CachedMesh> MeshCache::load() const {
   const std::uint64_t size = sizeof(Header) + header.vertices * sizeof(structure.vertices[0]) +
                              header.triangles * sizeof(structure.triangles[0]) +
                              header.nodes * sizeof(structure.nodes[0]) + sizeof(Digest);
-  if (std::filesystem::file_size(file_, error) != size) return std::nullopt;  // before any memory is allocated
+  if (std::filesystem::file_size(file_, error) != size) return std::nullopt;  // checked before memory is allocated
   structure.vertices.resize(header.vertices);
   structure.triangles.resize(header.triangles);
   structure.nodes.resize(header.nodes);
@@ -199,7 +201,7 @@ void MeshCache::store(const CachedMesh& mesh) const {
   header.account = mesh.account;
   const auto signed_as = signature(header, structure, secret_);
   if (!signed_as) return;
-  // Write beside the final place, then rename: the cache appears complete or not at all.
+  // Write to a file beside the final place, then rename it. So the cache appears either complete or not at all.
   const std::string beside = file_.string() + "." + std::to_string(::getpid());
   const Descriptor out = create(beside, 0644);
   if (out.get() < 0) return;

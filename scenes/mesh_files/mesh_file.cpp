@@ -29,12 +29,13 @@ using models::TriangleMesh;
 using models::TriangleSoup;
 using models::Vec3;
 
-// Some five million triangles of a binary STL. The parser's limits of time and memory grow with the file.
+// About five million triangles of a binary STL. The parser's limits of time and memory grow with the size of the file.
 constexpr std::uintmax_t most_bytes = std::uintmax_t{256} << 20;
 
 constexpr const char* kExpected = "a mesh: STL, OBJ or PLY, with triangles";
 
-// Size of a regular file that isn't too large. Refuses a pipe, on which reading could block without end.
+// Returns the size of a regular file. Throws SetupError if the file is too large. Also refuses a pipe, because reading
+// from it could block without end.
 std::uintmax_t checked_size(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) {
@@ -58,8 +59,8 @@ std::string contents_of(const std::filesystem::path& file) {
   return bytes;
 }
 
-// The file's extension selects the format. Damaged files can keep a parser busy for long, so this runs in a sandbox.
-// Throws std::runtime_error with the problem.
+// Parses the file. The extension selects the format. A damaged file can keep a parser busy for a long time, so this
+// function runs in a sandbox. Throws std::runtime_error with the problem.
 ParsedMesh parse(const std::filesystem::path& file, const std::string& extension) {
   const std::string bytes = contents_of(file);
   if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff")) {
@@ -69,7 +70,7 @@ ParsedMesh parse(const std::filesystem::path& file, const std::string& extension
   return extension == ".obj" ? parse_obj(bytes) : parse_ply(bytes);
 }
 
-// The parsed mesh as bytes, to pass it out of the sandbox.
+// The head of a parsed mesh as bytes, in which the mesh is passed out of the sandbox.
 struct Counts {
   FaceAccount account;
   double last_digit = 0.0;
@@ -111,7 +112,7 @@ ParsedMesh mesh_of(const std::vector<std::byte>& bytes) {
   return mesh;
 }
 
-// Transforms from the file's unit and frame to W.
+// Transforms the mesh from the file's unit and frame to W.
 void place(TriangleSoup& soup, const MeshPlacement& placement) {
   using Anchor = MeshPlacement::Anchor;
   models::Pose pose = placement.pose_W;
@@ -131,14 +132,14 @@ void place(TriangleSoup& soup, const MeshPlacement& placement) {
   for (Vec3& x : soup.vertices) x = pose * Vec3(placement.scale * x);
 }
 
-// In the file's unit.
+// Returns the default welding distance, in the file's unit.
 double weld_of(const ParsedMesh& mesh) {
   double largest = 0.0;
   for (const Vec3& x : mesh.soup.vertices) largest = std::max(largest, x.lpNorm<Eigen::Infinity>());
   return models::default_weld(largest, mesh.last_digit);
 }
 
-// Drops duplicate faces and, if the mesh isn't closed, welds its borders. Returns the given mesh if nothing changes.
+// Drops duplicate faces and, if the mesh isn't closed, welds its borders. Returns the given mesh if it doesn't change.
 std::shared_ptr<const TriangleMesh> repaired(std::shared_ptr<const TriangleMesh> mesh, double weld_m,
                                              FaceAccount& account) {
   TriangleSoup soup{mesh->structure().vertices, mesh->structure().triangles};
@@ -173,7 +174,7 @@ ParsedMesh parse_mesh_file(const std::filesystem::path& file) {
                       .found = extension.empty() ? "a file without an extension" : in_quotes(extension),
                       .expected = "a mesh: .stl, .obj or .ply"});
   }
-  // Ten times the time and memory that STL, OBJ and PLY files of this size need.
+  // Ten times the time and memory that intact STL, OBJ and PLY files of this size need.
   const double megabytes = 1e-6 * static_cast<double>(checked_size(file));
   const SandboxLimits limits{.seconds = 2.0 + megabytes,
                              .memory = 1'000'000'000 + static_cast<std::size_t>(60e6 * megabytes)};

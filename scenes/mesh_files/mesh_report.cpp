@@ -20,7 +20,7 @@ std::string counted(std::size_t count, const char* one, const char* several) {
   return std::to_string(count) + " " + (count == 1 ? one : several);
 }
 
-// The first ones, which are the smallest: large holes are visible.
+// Lists the first holes, which are the smallest: a user can see large holes without help.
 std::string holes_text(const std::vector<MeshHole>& holes, std::size_t count) {
   constexpr std::size_t told = 5;
   std::string text;
@@ -103,10 +103,10 @@ bool is_a_body(const LoadedMesh& loaded) {
 }
 
 std::vector<std::string> mesh_surprises(const models::TriangleMesh& mesh, double reach_m, double scale) {
-  // A mesh in millimetres is a thousand times too large, and objects that an arm touches have a tenth of its reach to
-  // some times its reach. So a mesh of 30 times the reach, or of a 3000th, is in the wrong unit.
+  // A mesh in millimetres is a thousand times too large. Objects that an arm touches are between a tenth of its reach
+  // and a few times its reach in size. So a mesh of 30 times the reach, or of a 3000th of it, is in the wrong unit.
   constexpr double too_large = 30.0, too_small = 1.0 / 3000.0;
-  // Share of the mesh's diagonal: larger holes are visible, and a sheet's border has about 1.
+  // As a share of the mesh's diagonal. Larger holes are visible; the border of a sheet has about 1.
   constexpr double hardly_seen = 0.1;
   std::vector<std::string> lines;
   const double diagonal = (mesh.bounds().high - mesh.bounds().low).norm();
@@ -117,8 +117,9 @@ std::vector<std::string> mesh_surprises(const models::TriangleMesh& mesh, double
                     ", write scale_m: " + description::number_text(scale * factor));
   }
   if (mesh.closed()) return lines;
-  // A crack may be as narrow as the rounding of coordinates if a file repeats a vertex, such as the pole of a sphere
-  // that a script computed for each triangle. A proxy doesn't fall through it, as no coordinates lie within it.
+  // A crack may be as narrow as the rounding of coordinates if a file repeats a vertex. An example is the pole of a
+  // sphere, if a script computed it for each triangle separately. A proxy doesn't fall through such a crack, because no
+  // coordinates lie within it.
   const double largest_m = mesh.bounds().low.cwiseAbs().cwiseMax(mesh.bounds().high.cwiseAbs()).maxCoeff();
   std::vector<MeshHole> holes = models::topology_of(mesh).holes;
   std::erase_if(holes, [&](const MeshHole& hole) {

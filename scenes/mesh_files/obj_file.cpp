@@ -14,7 +14,7 @@
 namespace proxarm::scenes {
 namespace {
 
-// Keywords without geometry.
+// True for keywords that don't describe geometry.
 bool says_nothing(std::string_view keyword) {
   constexpr std::array ignored{"vt",       "vn",         "vp",        "g",     "o",   "s",   "mg",   "usemtl",
                                "mtllib",   "usemap",     "maplib",    "bevel", "lod", "csh", "call", "c_interp",
@@ -45,7 +45,7 @@ class ObjText {
   }
 
  private:
-  // The line, with those joined to it by a backslash at its end.
+  // Returns the current line, together with the lines that a backslash at its end joins to it.
   std::string_view whole_line() {
     std::string_view line = text_.rest_of_line();
     if (!line.ends_with('\\')) return line;
@@ -74,7 +74,7 @@ class ObjText {
                              " where v, f or another word of OBJ was expected");
   }
 
-  // x y z, optionally with a weight or a colour.
+  // Reads x y z, optionally followed by a weight or a colour.
   void read_vertex(std::string_view line) {
     std::array<double, 3> x{};
     for (double& coordinate : x) {
@@ -95,7 +95,8 @@ class ObjText {
     if (!mesh_.add_vertex(x[0], x[1], x[2])) refuse_not_finite(where_);
   }
 
-  // Each corner is v, v/vt, v//vn or v/vt/vn. Numbers count from 1; negative ones count back from the last vertex.
+  // Reads a face. Each corner is v, v/vt, v//vn or v/vt/vn. Numbers count from 1; negative numbers count back from the
+  // last vertex.
   void read_face(std::string_view line) {
     corners_.clear();
     for (std::string_view word = next_word(line); !word.empty(); word = next_word(line)) {
@@ -111,7 +112,8 @@ class ObjText {
     mesh_.add_face(corners_);
   }
 
-  // Some writers announce a count: "# Faces: 12" (MeshLab), "# Mesh 'part' with 12 faces" (assimp).
+  // Reads a comment, because some programs announce a count in a comment: "# Faces: 12" (MeshLab), "# Mesh 'part' with
+  // 12 faces" (assimp).
   void read_comment(std::string_view line) {
     line.remove_prefix(1);
     std::vector<std::string_view> words;
@@ -140,7 +142,8 @@ class ObjText {
     require(announced_faces_, mesh_.account().faces, " faces");
   }
 
-  // OBJ has no end mark. So a file counts as cut off if its last line has no line end and its last vertices are unused.
+  // Throws if the file is cut off. OBJ has no end mark. So a file counts as cut off if its last line has no line end
+  // and no face uses its last vertices.
   void require_ended(const FaceAccount& account) const {
     const bool ended = bytes_.empty() || bytes_.back() == '\n' || bytes_.back() == '\r';
     if (ended || account.unused_vertices == 0 || highest_ + 1 == static_cast<std::int64_t>(account.vertices)) return;

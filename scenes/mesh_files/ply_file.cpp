@@ -43,7 +43,7 @@ Type type_of(std::string_view name, const std::string& where) {
 struct Property {
   std::string name;
   Type type = Type::f32;
-  std::optional<Type> counted_by;  // type of a list's count; nullopt: no list
+  std::optional<Type> counted_by;  // type of the count of a list; nullopt: the property isn't a list
 };
 
 struct Element {
@@ -57,10 +57,10 @@ enum class Format : std::uint8_t { text, little_endian, big_endian };
 struct Header {
   Format format = Format::text;
   std::vector<Element> elements;
-  std::size_t end = 0;  // where the data begin
+  std::size_t end = 0;  // position at which the data begin
 };
 
-// From a line such as "element face 12".
+// Parses a line such as "element face 12".
 Element element_of(std::string_view line, const std::string& where) {
   Element element;
   element.name = next_word(line);
@@ -70,7 +70,7 @@ Element element_of(std::string_view line, const std::string& where) {
   return element;
 }
 
-// From a line such as "property float x" or "property list uchar int vertex_indices".
+// Parses a line such as "property float x" or "property list uchar int vertex_indices".
 Property property_of(std::string_view line, const std::string& where) {
   Property property;
   std::string_view type = next_word(line);
@@ -93,7 +93,7 @@ Format format_of(std::string_view line, const std::string& where) {
 }
 
 Header header_of(std::string_view bytes) {
-  // Data begin right after the header's last line, which has the same line end as the first.
+  // The data begin right after the header's last line. This line has the same line end as the first line.
   const std::size_t first = bytes.find_first_of("\r\n");
   const std::string_view ending = first == bytes.npos                       ? "\n"
                                   : bytes.substr(first).starts_with("\r\n") ? "\r\n"
@@ -128,13 +128,13 @@ Header header_of(std::string_view bytes) {
   throw std::runtime_error("no end_header");
 }
 
-// The values after the header, in order.
+// Reads the values after the header, in the order of the file.
 class Values {
  public:
   Values(std::string_view data, Format format) : data_(data), text_(data), format_(format) {}
 
   [[nodiscard]] bool binary() const noexcept { return format_ != Format::text; }
-  // The last value as written in a text file; empty for a binary file.
+  // Returns the last value as it is written in a text file; empty for a binary file.
   [[nodiscard]] std::string_view written() const noexcept { return written_; }
   [[nodiscard]] std::size_t left() const noexcept { return data_.size() - (binary() ? at_ : text_.at()); }
 
@@ -162,7 +162,8 @@ class Values {
     return static_cast<std::int64_t>(value);
   }
 
-  // Number of bytes after a binary file's last element. Throws for text after a text file's.
+  // Returns the number of bytes after the last element of a binary file. Throws if a text file has more text after its
+  // last element.
   std::uint64_t behind() {
     if (binary()) return left();
     const std::string_view word = text_.word();
@@ -235,7 +236,8 @@ class Ply {
     return property.counted_by && (property.name == "vertex_indices" || property.name == "vertex_index");
   }
 
-  // A header may announce any count: each value needs at least a byte in the file.
+  // Throws if the file is too short for the element: a header may announce any count, but each value needs at least one
+  // byte in the file.
   void require_room(const Element& element) const {
     std::size_t least = 0;
     for (const Property& property : element.properties) {

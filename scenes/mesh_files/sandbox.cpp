@@ -41,7 +41,7 @@ const bool sandbox_limits_memory = true;
 
 namespace {
 
-// First part of the child's result.
+// How the child ended. It is the first part of the child's result.
 enum class Outcome : std::uint64_t { none, read, refused, no_memory };
 struct Header {
   Outcome outcome = Outcome::none;
@@ -115,7 +115,7 @@ void confine(const SandboxLimits& limits) noexcept {
   }
 }
 
-// Writes the child's result, the header last: a result without a header is incomplete.
+// Writes the child's result. The header is written last, so a result without a header is incomplete.
 void leave(int fd, Outcome outcome, const void* data, std::size_t size) noexcept {
   const Header header{outcome, size};
   if (write_all(fd, data, size, sizeof header)) write_all(fd, &header, sizeof header, 0);
@@ -139,7 +139,7 @@ void leave(int fd, Outcome outcome, const void* data, std::size_t size) noexcept
   ::_exit(0);
 }
 
-// Waits until the child's end closes the pipe. False if that takes longer than `seconds`.
+// Waits until the end of the child closes the pipe. False if this takes longer than `seconds`.
 bool wait_until_closed(int fd, double seconds) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));

@@ -15,7 +15,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "binary STL is read as it is in memory");
 
-// Binary: 80 arbitrary bytes, the number of triangles (u32), then 50 bytes for each.
+// Binary STL: 80 arbitrary bytes, the number of triangles (u32), then 50 bytes for each triangle.
 constexpr std::size_t head_bytes = 84, facet_bytes = 50, normal_bytes = 12, vertex_bytes = 12;
 
 std::uint32_t count_in(std::string_view bytes) {
@@ -54,7 +54,7 @@ ParsedMesh parse_binary(std::string_view bytes) {
   return mesh.finish();
 }
 
-// solid NAME, then facets: facet normal i j k, outer loop, vertex x y z …, endloop, endfacet; endsolid NAME.
+// Text STL: solid NAME, then facets: facet normal i j k, outer loop, vertex x y z …, endloop, endfacet; endsolid NAME.
 class TextStl {
  public:
   explicit TextStl(std::string_view bytes) : text_(bytes) {}
@@ -81,7 +81,7 @@ class TextStl {
   }
 
   void read_solid() {
-    // The name is the rest of the line, unless the whole solid is on one line.
+    // The name is the rest of the line, unless the whole solid stands on one line.
     TextScanner ahead = text_;
     const std::string name = lower(ahead.rest_of_line());
     std::string word;
@@ -99,7 +99,7 @@ class TextStl {
 
   void read_facet() {
     expect("normal");
-    for (int k = 0; k < 3; ++k) (void)text_.word();  // ignored: the corners' order gives the normal
+    for (int k = 0; k < 3; ++k) (void)text_.word();  // ignored: the order of the corners gives the normal
     expect("outer");
     expect("loop");
     corners_.clear();
@@ -133,7 +133,7 @@ ParsedMesh parse_stl(std::string_view bytes) {
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   TextScanner scanner(text.substr(0, 1000));
   if (sized || lower(scanner.word()) != "solid") return parse_binary(bytes);
-  // A damaged binary file may also begin with "solid"; text has no zero bytes.
+  // A damaged binary file may also begin with "solid", but it contains zero bytes, which a text file doesn't.
   if (text.find('\0') != std::string_view::npos) return parse_binary(bytes);
   return TextStl(text).parse();
 }

@@ -43,7 +43,7 @@ const bool sandbox_filters_system_calls = true;
 
 namespace {
 
-// Harmless with any arguments.
+// Calls that are harmless with any arguments.
 constexpr std::uint32_t allowed[] = {
     SYS_read,
     SYS_readv,
@@ -88,14 +88,14 @@ constexpr std::uint32_t allowed[] = {
 
 using Program = std::vector<sock_filter>;
 
-constexpr std::uint32_t argument(unsigned i) {  // its low half: these processors are little-endian
+constexpr std::uint32_t argument(unsigned i) {  // the low half of the argument: these processors are little-endian
   return static_cast<std::uint32_t>(offsetof(seccomp_data, args) + 8 * i);
 }
 void load(Program& p, std::uint32_t offset) { p.push_back(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offset)); }
 void answer(Program& p, std::uint32_t action) { p.push_back(BPF_STMT(BPF_RET | BPF_K, action)); }
 
-// Rule: `call` is allowed if the test of its i-th argument succeeds (continues with the next instruction); otherwise
-// the process is killed.
+// Adds a rule: `call` is allowed if the test of its i-th argument succeeds, that is, continues with the next
+// instruction. Otherwise the process is killed.
 void allow_where(Program& p, std::uint32_t call, unsigned i, const sock_filter& test) {
   p.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, call, 0, 4));
   load(p, argument(i));
@@ -104,17 +104,17 @@ void allow_where(Program& p, std::uint32_t call, unsigned i, const sock_filter& 
   answer(p, SECCOMP_RET_KILL_PROCESS);
 }
 
-// If the argument is `value`.
+// Allows the call if its i-th argument equals `value`.
 void allow_with(Program& p, std::uint32_t call, unsigned i, std::uint32_t value) {
   allow_where(p, call, i, BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, 0, 1));
 }
 
-// If none of these bits is set in the argument.
+// Allows the call if none of the `bits` is set in its i-th argument.
 void allow_without(Program& p, std::uint32_t call, unsigned i, std::uint32_t bits) {
   allow_where(p, call, i, BPF_JUMP(BPF_JMP | BPF_JSET | BPF_K, bits, 1, 0));
 }
 
-// If the argument is at most this value.
+// Allows the call if its i-th argument is at most `most`.
 void allow_up_to(Program& p, std::uint32_t call, unsigned i, std::uint32_t most) {
   allow_where(p, call, i, BPF_JUMP(BPF_JMP | BPF_JGT | BPF_K, most, 1, 0));
 }
@@ -137,10 +137,10 @@ Program program_for(int results) {
   allow_without(p, SYS_mmap, 2, PROT_EXEC);
   allow_without(p, SYS_mprotect, 2, PROT_EXEC);
   allow_with(p, SYS_pwrite64, 0, static_cast<std::uint32_t>(results));
-  allow_up_to(p, SYS_write, 0, STDERR_FILENO);  // last messages, such as abort()'s
+  allow_up_to(p, SYS_write, 0, STDERR_FILENO);  // for last messages, such as those of abort()
   allow_up_to(p, SYS_writev, 0, STDERR_FILENO);
-  allow_with(p, SYS_tgkill, 0, static_cast<std::uint32_t>(::getpid()));  // abort()
-  p.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_ioctl, 0, 1));     // isatty()
+  allow_with(p, SYS_tgkill, 0, static_cast<std::uint32_t>(::getpid()));  // used by abort()
+  p.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_ioctl, 0, 1));     // used by isatty()
   answer(p, SECCOMP_RET_ERRNO | ENOTTY);
   answer(p, SECCOMP_RET_KILL_PROCESS);
   return p;

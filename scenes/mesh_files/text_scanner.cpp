@@ -25,7 +25,7 @@ bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\n' || c 
 
 void TextScanner::step() noexcept {
   const char c = text_[at_++];
-  // \r\n counts once, at its \n.
+  // \r\n counts as one line end, at its \n.
   if (c == '\n' || (c == '\r' && (at_ >= text_.size() || text_[at_] != '\n'))) ++line_;
 }
 
@@ -66,7 +66,8 @@ double number_of(std::string_view word, const std::string& where) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (error == std::errc::result_out_of_range && end == digits.data() + digits.size()) {
-    return std::strtod(std::string(digits).c_str(), nullptr);  // 0 if too small, infinity if too large
+    // 0 if the number is too small, infinity if it is too large
+    return std::strtod(std::string(digits).c_str(), nullptr);
   }
   if (error != std::errc() || end != digits.data() + digits.size()) refuse(word, where, "a number");
   return value;
@@ -77,7 +78,7 @@ long long whole_number_of(std::string_view word, const std::string& where) {
   if (digits.starts_with('+')) digits.remove_prefix(1);
   long long value = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  // Larger than any file: the caller reports why it is invalid.
+  // The number is larger than any file: the caller reports why it is invalid.
   if (error == std::errc::result_out_of_range && end == digits.data() + digits.size()) {
     return digits.starts_with('-') ? std::numeric_limits<long long>::min() : std::numeric_limits<long long>::max();
   }

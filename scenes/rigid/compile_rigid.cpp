@@ -31,10 +31,11 @@ Pose at(const Vec3& place, const Vec3& axis) {
 
 using Shapes = std::vector<decltype(RigidObject::shape)>;
 
-// A tool inside of something stands before sides. A cylinder's and a box's are flat.
+// Returns a flat side of an object that encloses the tool, such as a box seen from inside or a cylinder's end.
 FlatSide side(const Vec3& normal, const Vec3& through) { return {normal, normal.dot(through)}; }
 
-// What an object that why_not_beside() lets through is made of.
+// Converts an object's shape to the shapes that a rigid tool can touch. Precondition: why_not_beside() found no reason
+// against the object.
 struct ShapesOf {
   Shapes operator()(const PlaneShape& s) const { return {side(s.normal.normalized(), s.point_m)}; }
   Shapes operator()(const SphereShape& s) const {
@@ -56,7 +57,7 @@ struct ShapesOf {
     }
     return sides;
   }
-  // From inside: the tube as if it had no end, and both ends.
+  // From inside, a cylinder consists of an endless tube and of two flat ends.
   Shapes operator()(const CylinderShape& s) const {
     if (!s.inside_out) {
       const Vec3 along = s.to_m - s.from_m;
@@ -68,7 +69,7 @@ struct ShapesOf {
   Shapes operator()(const MeshShape& s) const { return {std::make_shared<const models::TriangleFeatures>(s.mesh)}; }
 };
 
-// Of a mesh whose faces don't make a body it says so, at the object's line.
+// Returns the shapes of an object. Throws SetupError with the object's line if the faces of its mesh don't make a body.
 Shapes shapes_of(const Scene& scene, const Object& object) {
   try {
     return std::visit(ShapesOf{}, object.shape);
@@ -80,7 +81,8 @@ Shapes shapes_of(const Scene& scene, const Object& object) {
   }
 }
 
-// What no test holds yet is refused. Empty: nothing stands against it.
+// Returns why the object can't be rendered with a rigid tool; empty if it can. Everything that no test covers yet is
+// refused.
 std::string why_not_beside(const Object& object, const models::Tool& tool) {
   const std::string name = "\"" + object.name + "\"";
   if (object.layer) return "a rigid tool touches rigid objects only, and " + name + " has a layer";

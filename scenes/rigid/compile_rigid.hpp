@@ -1,4 +1,4 @@
-// From a scene and a rigid tool to the 𝒢 of a pose.
+// Compiles a scene and a rigid tool to a 𝒢 of poses.
 #pragma once
 
 #include <memory>
@@ -11,16 +11,16 @@
 
 namespace proxarm::scenes {
 
-// Why a tool can't be rendered in a scene, as a sentence; none if it can. `line` of the scene's file is set where one
-// is to blame.
+// The reason why a tool can't be rendered in a scene, as a sentence. If a line of the scene's file causes it, `line` is
+// that line, else 0. why_not() returns nullopt if the tool can be rendered.
 struct Refusal {
   std::string why;
   int line = 0;
 };
 std::optional<Refusal> why_not(const Scene& scene, const models::Tool& tool);
 
-// Throws description::SetupError where why_not() has a reason, and for a shape without a size. A scene without objects
-// gives FreePose. Media, a Coulomb force and a guide are no part of it: they are refused.
+// Compiles the scene. A scene without objects gives FreePose. Throws description::SetupError if why_not() returns a
+// reason, or if a shape has no size. Media, a Coulomb force and a guide are refused.
 std::unique_ptr<models::PoseAlgorithm> compile_rigid(const Scene& scene, const models::Tool& tool);
 
 }  // namespace proxarm::scenes

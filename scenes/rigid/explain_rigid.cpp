@@ -17,7 +17,7 @@ using models::Mat6;
 using models::ToolPose;
 using models::Vec3;
 
-// Of 4 kg and 0.05 kg m² at 1 kHz.
+// Returns the stiffness K for 4 kg and 0.05 kg m² at 1 kHz.
 Mat6 stiffness() {
   Mat6 K = Mat6::Identity() * 4e6;
   K.bottomRightCorner<3, 3>() *= 0.05 / 4.0;
@@ -29,7 +29,7 @@ struct Cost {
   std::size_t most_contacts = 0, unresolved = 0;
 };
 
-// Steps towards p̂ = q + push, in which p̂ moves to and fro by a tenth as it does at 1 kHz.
+// Measures the cost of steps towards p̂ = q + push. p̂ moves to and fro by a tenth of the push, as it does at 1 kHz.
 Cost cost_of_steps(models::PoseAlgorithm& g, ToolPose q, const Vec3& push) {
   constexpr int steps_measured = 4000;
   const Mat6 K = stiffness();
@@ -53,7 +53,8 @@ Cost cost_of_steps(models::PoseAlgorithm& g, ToolPose q, const Vec3& push) {
   return cost;
 }
 
-// A place with room for the tool, near the scene's objects; none was found if it isn't outside of everything.
+// Returns the pose with the largest clearance for the tool that was found near the scene's objects. If this pose isn't
+// outside of all objects, no free pose was found.
 ToolPose roomy_place(const Scene& scene, const models::PoseAlgorithm& g) {
   ToolPose best, tried;
   double room_m = -1.0;
@@ -77,7 +78,7 @@ void tell_costs(const Scene& scene, models::PoseAlgorithm& g, std::ostringstream
   out << "cost of a step here, median and 99 of 100\n";
   const Cost free = cost_of_steps(g, q, Vec3::Zero());
   out << "  free: " << free.median_ns << " ns, " << free.worst_ns << " ns\n";
-  // It goes in all directions until it meets a surface, and is then pressed by 5 µm, as 20 N do.
+  // Moves the tool in various directions until it meets a surface. The tool is then pressed by 5 µm, as 20 N do.
   for (int i = 0; i < 60; ++i) {
     Vec3 direction;
     for (int a = 0; a < 3; ++a) direction[a] = std::sin(2.0 + 78.233 * (i + 1) * (a + 1));

@@ -1,4 +1,4 @@
-// Tells what a scene with a rigid tool compiles to, and what a step costs on this machine.
+// Describes what a scene with a rigid tool compiles to, and how long a step takes on this machine.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace proxarm::scenes {
 
-// As text for a person. Takes some 20 ms. Precondition: the scene has a tool. Throws description::SetupError for what a
-// rigid tool can't be rendered in.
+// Returns the description as text for the user. Takes about 20 ms. Precondition: the scene has a tool. Throws
+// description::SetupError if the scene can't be rendered with a rigid tool.
 std::string explain_rigid(const Scene& scene);
 
 }  // namespace proxarm::scenes

@@ -6,7 +6,7 @@ namespace proxarm::sim {
 
 DeviceNode::DeviceNode(std::string name, std::size_t bus, fieldbus::EventQueue& events, Clockwork& clockwork)
     : name_(std::move(name)), bus_(bus), events_(events), clockwork_(clockwork) {
-  constexpr std::size_t usually = 16;  // frames in preparation in normal operation; more are possible
+  constexpr std::size_t usually = 16;  // frames in preparation in normal operation; there may be more
   waiting_.reserve(usually);
   free_places_.reserve(usually);
 }

@@ -1,5 +1,5 @@
-// Connects a simulated device to its bus: delivers frames to it, sends its frames when they are ready, and simulates
-// faults of the connection.
+// Connects a simulated device to its bus. Delivers frames to the device, sends the device's frames when they are ready,
+// and simulates faults of the connection.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,16 @@
 
 namespace proxarm::sim {
 
-// Called before a frame reaches a device, so that the physics is advanced to the frame's time.
+// Is called before a frame reaches a device, so that the physics can be advanced to the frame's time.
 class Clockwork {
  public:
   virtual ~Clockwork() = default;
   virtual void advance_to(std::int64_t time_ns) noexcept = 0;
-  // The frame, before the device gets it.
+  // Gets each frame before the device gets it.
   virtual void seen(const fieldbus::CanFrame& /*frame*/, std::int64_t /*time_ns*/) noexcept {}
 };
 
-// One node. The device is set later, since it needs the node as its port.
+// One node of a bus. Its device is set later, because the device needs the node as its port.
 class DeviceNode final : public fieldbus::CanListener, public DevicePort {
  public:
   DeviceNode(std::string name, std::size_t bus, fieldbus::EventQueue& events, Clockwork& clockwork);
@@ -30,13 +30,15 @@ class DeviceNode final : public fieldbus::CanListener, public DevicePort {
   void connect(fieldbus::CanPort& port) noexcept { port_ = &port; }
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  [[nodiscard]] std::size_t bus() const noexcept { return bus_; }  // index in the cell
+  [[nodiscard]] std::size_t bus() const noexcept { return bus_; }  // index of the bus in the cell
   [[nodiscard]] std::uint64_t frames_sent() const noexcept { return frames_sent_; }
-  [[nodiscard]] std::uint64_t frames_not_sent() const noexcept { return frames_not_sent_; }  // the port refused them
+  // Number of frames that the port refused.
+  [[nodiscard]] std::uint64_t frames_not_sent() const noexcept { return frames_not_sent_; }
 
-  // Disconnects the node in both directions. Counts, since several faults may cut it at the same time.
+  // Disconnects the node in both directions (true) or connects it again (false). Calls are counted, because several
+  // faults may disconnect the node at the same time.
   void cut(bool cut) noexcept { cuts_ += cut ? 1 : -1; }
-  // Without power the device doesn't run.
+  // Switches the device on or off. Without power the device doesn't run.
   void set_power(bool on, std::int64_t time_ns) noexcept;
 
   void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
@@ -53,7 +55,7 @@ class DeviceNode final : public fieldbus::CanListener, public DevicePort {
   Clockwork& clockwork_;
   BusDevice* device_ = nullptr;
   fieldbus::CanPort* port_ = nullptr;
-  std::vector<fieldbus::CanFrame> waiting_;  // frames that aren't ready yet; the places are reused
+  std::vector<fieldbus::CanFrame> waiting_;  // frames that aren't ready yet; places are reused
   std::vector<std::uint32_t> free_places_;
   std::uint64_t frames_sent_ = 0, frames_not_sent_ = 0;
   int cuts_ = 0;

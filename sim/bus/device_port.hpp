@@ -7,8 +7,9 @@
 
 namespace proxarm::sim {
 
-// Sends a device's frames. A device needs time to answer, so each frame has the time at which it is ready to be sent; a
-// time in the past means now. Frames of one device with the same time leave in the order of the calls.
+// Sends a device's frames. A device needs time to answer, so each frame has the time ready_ns at which it is sent. If
+// ready_ns is in the past, the frame is sent now. Frames of one device with the same ready_ns leave in the order of the
+// calls.
 class DevicePort {
  public:
   DevicePort() = default;
@@ -19,7 +20,7 @@ class DevicePort {
   virtual void send(const fieldbus::CanFrame& frame, std::int64_t ready_ns) noexcept = 0;
 };
 
-// A device on a bus. The times of successive calls never decrease.
+// A device on a bus. Precondition for its functions: the times of successive calls never decrease.
 class BusDevice {
  public:
   BusDevice() = default;
@@ -27,11 +28,11 @@ class BusDevice {
   BusDevice& operator=(const BusDevice&) = delete;
   virtual ~BusDevice() = default;
 
-  // Power comes on: the device restarts from its stored settings.
+  // Switches the power on: the device restarts from its stored settings.
   virtual void power_on(std::int64_t time_ns) noexcept = 0;
-  // A frame of another node, complete at time_ns. May contain any bytes.
+  // Gets a frame of another node. The frame's last bit was on the wire at time_ns. The frame may contain any bytes.
   virtual void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept = 0;
-  // Runs timers and sends periodic frames. Called at least once a millisecond.
+  // Runs timers and sends periodic frames. Must be called at least once a millisecond.
   virtual void on_time(std::int64_t time_ns) noexcept = 0;
 };
 

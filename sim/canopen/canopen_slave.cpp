@@ -9,7 +9,8 @@ namespace proxarm::sim {
 namespace {
 
 constexpr std::int64_t millisecond = 1'000'000;
-constexpr std::int64_t sdo_timeout = 1'000 * millisecond;  // ends a transfer that the client has abandoned
+// After this time without a request, a transfer counts as abandoned by the client and is ended.
+constexpr std::int64_t sdo_timeout = 1'000 * millisecond;
 
 fieldbus::CanFrame make_frame(std::uint32_t id, std::span<const std::uint8_t> bytes) noexcept {
   fieldbus::CanFrame frame;
@@ -37,11 +38,12 @@ void CanopenSlave::add_communication_objects() {
   ObjectDictionary& od = dictionary_;
   od.add(0x1000, 0, unsigned32, constant, config_.device_type);
   od.add(0x1001, 0, unsigned8, read_only, 0, true);
-  od.add(0x1003, 0, unsigned8, read_write, 0).maximum = 0;  // only 0 may be written, which clears the history
+  od.add(0x1003, 0, unsigned8, read_write, 0).maximum = 0;  // only 0 may be written; it clears the error history
   for (std::uint8_t i = 1; i <= 8; ++i) od.add(0x1003, i, unsigned32, read_only, 0);
   sync_id_ = &od.add(0x1005, 0, unsigned32, read_write, 0x80);
   sync_id_->before_write = [](std::int64_t value) {
-    return (value & ~0x7FF) == 0 ? SdoAbort::none : SdoAbort::invalid_value;  // bit 30: it doesn't generate SYNC
+    // Bit 30 must be 0: the device doesn't generate SYNC.
+    return (value & ~0x7FF) == 0 ? SdoAbort::none : SdoAbort::invalid_value;
   };
   od.add(0x1006, 0, unsigned32, read_write, 0);
   sync_window_ = &od.add(0x1007, 0, unsigned32, read_write, 0);
@@ -59,7 +61,7 @@ void CanopenSlave::add_communication_objects() {
   }
   od.add(0x1017, 0, unsigned16, read_write, 0).after_write = [this] {
     heartbeat_period_ns_ = dictionary_.number(0x1017) * millisecond;
-    heartbeat_ns_ = 0;  // send the first one at once
+    heartbeat_ns_ = 0;  // sends the first heartbeat at once
   };
   od.add(0x1018, 0, unsigned8, constant, 4);
   od.add(0x1018, 1, unsigned32, constant, config_.vendor);
@@ -114,7 +116,7 @@ void CanopenSlave::enter(NmtState to, std::int64_t time_ns) {
       receive->last_ns = never;
     }
   } else {
-    if (config_.stack == StackBehaviour::lazy) last_sync_ns_ = never;  // watched from the first SYNC on
+    if (config_.stack == StackBehaviour::lazy) last_sync_ns_ = never;  // SYNC is watched from the first SYNC on
     for (auto& transmit : transmit_) {
       transmit->last_ns = never;
       transmit->syncs = 0;
@@ -159,7 +161,7 @@ void CanopenSlave::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_n
   const bool is_guarded = frame.remote && !frame.extended && frame.id == 0x700u + config_.node;
   if (is_guarded && state_ != NmtState::initialising) return on_guard_request(time_ns);
   if (frame.extended || frame.remote || frame.error || frame.length > (frame.fd ? 64 : 8)) return;
-  if (frame.fd != (config_.fd && is_pdo(frame.id))) return;  // only PDOs use FD frames
+  if (frame.fd != (config_.fd && is_pdo(frame.id))) return;  // only PDOs are CAN FD frames
   if (state_ == NmtState::initialising) return;
   if (frame.id == 0) return on_nmt_command(frame, time_ns);
   if (frame.id > 0x700 && frame.id <= 0x77F) {
@@ -195,7 +197,7 @@ void CanopenSlave::answer_sdo(SdoServer::Message message, std::int64_t time_ns) 
   if (quirks_.sdo_stray) {
     SdoServer::Message stray = message;
     stray[1] = 0xFF;
-    stray[2] = 0x5F;  // 5FFFh
+    stray[2] = 0x5F;  // the object is now 5FFFh
     port_.send(make_frame(id, stray), time_ns);
   }
   port_.send(make_frame(id, message), time_ns);
@@ -204,7 +206,7 @@ void CanopenSlave::answer_sdo(SdoServer::Message message, std::int64_t time_ns) 
 
 void CanopenSlave::on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns) {
   if (quirks_.hears_no_sync_in > 0 && ++syncs_ % quirks_.hears_no_sync_in == 0) return;
-  if (frame.length != 0) {  // 1019h is 0: no counter expected
+  if (frame.length != 0) {  // 1019h is 0, so SYNC must have no counter
     raise_error(emcy::sync_length, error_register::communication, time_ns);
     return;
   }
@@ -221,13 +223,13 @@ void CanopenSlave::on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns
   if (state_ == NmtState::operational) transmit_on_sync(time_ns);
 }
 
-// A PDO received after the synchronous window (1007h) is ignored. A PDO that is too short is refused; of one that is
-// too long, the first bytes count.
+// Handles a receive PDO. A synchronous PDO that comes after the synchronous window (1007h) is ignored. A PDO that is
+// too short is refused. If a PDO is too long, its first bytes are used.
 void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
   if (frame.length < receive.pdo.length()) {
     return raise_error(emcy::pdo_too_short, error_register::communication, time_ns);
   }
-  // A CAN FD frame is padded to the next valid length.
+  // A CAN FD frame may be longer than the mapped bytes, because it is padded to the next valid length.
   if (frame.length > fieldbus::padded_length(receive.pdo.length(), config_.fd)) {
     raise_error(emcy::pdo_too_long, error_register::communication, time_ns);
   } else {
@@ -235,7 +237,7 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
   }
   clear_error(emcy::pdo_too_short, time_ns);
   receive.last_ns = time_ns;
-  if (!latches()) clear_error(emcy::rpdo_timeout, time_ns);  // also an error from before the PDO was configured
+  if (!latches()) clear_error(emcy::rpdo_timeout, time_ns);  // clears also an error from before the PDO was configured
   receive.overdue = false;
   const std::int64_t window_ns = sync_window_->number() * 1'000;
   if (!receive.pdo.synchronous()) return receive.pdo.unpack(frame.bytes());
@@ -245,7 +247,7 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
 }
 
 void CanopenSlave::on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
-  if (frame.length != 1 || frame.data[0] == 0) return;  // a boot-up message is no heartbeat
+  if (frame.length != 1 || frame.data[0] == 0) return;  // a boot-up message doesn't count as a heartbeat
   for (Consumer& consumer : consumers_) {
     if (consumer.limit_ns == 0 || consumer.node != node) continue;
     consumer.last_ns = time_ns;
@@ -302,7 +304,7 @@ void CanopenSlave::check_heartbeats(std::int64_t time_ns) {
   }
 }
 
-// CiA 301: a node that produces heartbeats has no node guarding.
+// Answers a node guarding request. A node that produces heartbeats doesn't answer (CiA 301).
 void CanopenSlave::on_guard_request(std::int64_t time_ns) noexcept {
   if (heartbeat_period_ns_ > 0) return;
   last_guard_ns_ = time_ns;
@@ -322,7 +324,7 @@ void CanopenSlave::check_life_guarding(std::int64_t time_ns) {
   error_behaviour(time_ns);
 }
 
-// For a lazy stack: only reports the error.
+// Checks for a missing SYNC in a lazy stack, which only reports the error.
 void CanopenSlave::check_sync(std::int64_t time_ns) {
   const std::int64_t period_ns = dictionary_.number(0x1006) * 1'000;
   if (period_ns == 0 || last_sync_ns_ == never || time_ns - last_sync_ns_ <= period_ns + period_ns / 2) return;
@@ -341,7 +343,8 @@ void CanopenSlave::check_receive_pdos(std::int64_t time_ns, bool synchronous, bo
   }
 }
 
-// 1029h:01: 0 pre-operational if operational, 1 no change, 2 stopped.
+// Reacts to a communication error as 1029h:01 says. 0: from operational to pre-operational; 1: no change; 2: to
+// stopped.
 void CanopenSlave::error_behaviour(std::int64_t time_ns) {
   const std::int64_t behaviour = dictionary_.number(0x1029, 1);
   if (behaviour == 0 && state_ == NmtState::operational) enter(NmtState::pre_operational, time_ns);
@@ -350,7 +353,7 @@ void CanopenSlave::error_behaviour(std::int64_t time_ns) {
 
 // ---- Transmit PDOs
 
-// Types 1..240: with every n-th SYNC; 0: with the next SYNC after a change.
+// Sends synchronous PDOs. Types 1..240: with every n-th SYNC; type 0: with the next SYNC after a change.
 void CanopenSlave::transmit_on_sync(std::int64_t time_ns) noexcept {
   for (auto& pdo : transmit_) {
     if (!pdo->pdo.valid() || !pdo->pdo.synchronous()) continue;
@@ -362,8 +365,8 @@ void CanopenSlave::transmit_on_sync(std::int64_t time_ns) noexcept {
   }
 }
 
-// Types 254 and 255: on a change, but not within the inhibit time after the last one; at the latest when the event
-// timer expires.
+// Sends PDOs of types 254 and 255: after a change of their data, but not within the inhibit time after the last
+// transmission; and when the event timer expires.
 void CanopenSlave::transmit_events(std::int64_t time_ns) noexcept {
   for (auto& pdo : transmit_) {
     if (!pdo->pdo.valid() || pdo->pdo.synchronous()) continue;
@@ -396,7 +399,7 @@ void CanopenSlave::transmit(Transmit& pdo, const std::array<std::uint8_t, 64>& d
 SdoAbort CanopenSlave::check_consumer(std::uint8_t subindex, std::int64_t value) const noexcept {
   const std::int64_t node = value >> 16 & 0xFF;
   if (value >> 24 != 0 || node > 127) return SdoAbort::invalid_value;
-  if ((value & 0xFFFF) == 0 || node == 0) return SdoAbort::none;  // unused
+  if ((value & 0xFFFF) == 0 || node == 0) return SdoAbort::none;  // the consumer is unused
   for (std::uint8_t i = 1; i <= consumers; ++i) {
     const std::int64_t other = dictionary_.number(0x1016, i);
     if (i != subindex && (other & 0xFFFF) != 0 && (other >> 16 & 0xFF) == node) {
@@ -425,7 +428,7 @@ bool CanopenSlave::has_error(std::uint16_t code) const noexcept {
 void CanopenSlave::raise_error(std::uint16_t code, std::uint8_t register_bits, std::int64_t time_ns) noexcept {
   if (has_error(code)) return;
   errors_.push_back({code, static_cast<std::uint8_t>(register_bits | error_register::generic)});
-  for (std::uint8_t i = 8; i > 1; --i) {  // newest first
+  for (std::uint8_t i = 8; i > 1; --i) {  // the newest error comes first
     dictionary_.at(0x1003, i).set(dictionary_.number(0x1003, static_cast<std::uint8_t>(i - 1)));
   }
   dictionary_.at(0x1003, 1).set(code);
@@ -439,7 +442,7 @@ void CanopenSlave::clear_error(std::uint16_t code, std::int64_t time_ns) noexcep
   send_emergency(errors_.empty() ? emcy::no_error : errors_.back().code, time_ns);
 }
 
-// code u16 | error register u8 | 5 bytes of the maker, here 0
+// Sends an EMCY: code u16 | error register u8 | five bytes that the maker defines, here 0
 void CanopenSlave::send_emergency(std::uint16_t code, std::int64_t time_ns) noexcept {
   std::uint8_t bits = 0;
   for (const Error& error : errors_) bits = static_cast<std::uint8_t>(bits | error.register_bits);

@@ -1,5 +1,6 @@
-// The object dictionary of a simulated CANopen device (CiA 301, 7.4): entries by index and subindex, with type, access,
-// whether a PDO may map it, default value and write hooks. Values are stored as on the wire: little-endian bytes.
+// The object dictionary of a simulated CANopen device (CiA 301, 7.4). Its entries have an index and a subindex, a data
+// type, an access type, a default value and functions that are called at a write; some may be mapped into PDOs. Values
+// are stored as on the wire, as little-endian bytes.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +13,9 @@
 
 namespace proxarm::sim {
 
-// SDO abort codes, numbers and wording of CiA 301, table 22.
+// SDO abort codes, with the numbers and the wording of CiA 301, table 22.
 enum class SdoAbort : std::uint32_t {
-  none = 0,  // not an abort: the access succeeded
+  none = 0,  // no abort: the access succeeded
   toggle_bit_not_alternated = 0x05030000,
   protocol_timed_out = 0x05040000,
   command_specifier_not_valid = 0x05040001,
@@ -47,10 +48,10 @@ enum class Access : std::uint8_t {
   read_only,
   write_only,
   read_write,
-  constant,  // read-only, and the device doesn't change it either
+  constant,  // read-only, and the device itself doesn't change it either
 };
 
-// Data types with their CiA 301 numbers.
+// Data types with their numbers in CiA 301.
 enum class DataType : std::uint16_t {
   boolean = 0x0001,
   integer8 = 0x0002,
@@ -76,7 +77,7 @@ enum class DataType : std::uint16_t {
   unsigned64 = 0x001B,
 };
 
-// Size in bytes of a type of fixed length; 0 for strings and domains.
+// Returns the size in bytes of a type of fixed length; 0 for strings and domains.
 [[nodiscard]] std::size_t size_of(DataType type) noexcept;
 
 struct ObjectEntry {
@@ -85,25 +86,26 @@ struct ObjectEntry {
   DataType type = DataType::unsigned32;
   Access access = Access::read_write;
   bool pdo_mappable = false;
-  bool hidden = false;                      // used by the device, but not visible on the network
-  std::vector<std::uint8_t> value;          // present value; of fixed length unless a string or domain
-  std::vector<std::uint8_t> default_value;  // after a reset
-  std::size_t max_length = 0;               // longest accepted string or domain
+  bool hidden = false;                      // used by the device itself, but invisible to the network
+  std::vector<std::uint8_t> value;          // current value; its length is fixed except for strings and domains
+  std::vector<std::uint8_t> default_value;  // value after a reset
+  std::size_t max_length = 0;               // length of the longest string or domain that is accepted
   std::optional<std::int64_t> minimum, maximum;
-  // Called before a write over SDO or PDO takes effect, with the new value (0 for strings and domains). A result other
-  // than `none` refuses the write.
+  // Is called with the new value (0 for strings and domains) before a write over SDO or PDO takes effect. A result
+  // other than `none` refuses the write.
   std::function<SdoAbort(std::int64_t)> before_write;
   std::function<void()> after_write;
 
-  // The value as a number, sign-extended for signed types; 0 for strings and domains. Never throws.
+  // Returns the value as a number, sign-extended for signed types; 0 for strings and domains. Never throws.
   [[nodiscard]] std::int64_t number() const noexcept;
-  // Sets the value without access check and hooks, truncated to the type's length.
+  // Sets the value, truncated to the type's length. Doesn't check the access type and doesn't call before_write or
+  // after_write.
   void set(std::int64_t number) noexcept;
 };
 
 class ObjectDictionary {
  public:
-  // Adds a number; the reference stays valid as long as the dictionary.
+  // Adds an entry with a number. The returned reference stays valid as long as the dictionary exists.
   ObjectEntry& add(std::uint16_t index, std::uint8_t subindex, DataType type, Access access, std::int64_t value,
                    bool pdo_mappable = false);
   ObjectEntry& add_text(std::uint16_t index, std::uint8_t subindex, std::string_view text);
@@ -111,24 +113,27 @@ class ObjectDictionary {
 
   [[nodiscard]] ObjectEntry* find(std::uint16_t index, std::uint8_t subindex) noexcept;
   [[nodiscard]] const ObjectEntry* find(std::uint16_t index, std::uint8_t subindex) const noexcept;
-  // All entries, for the code that builds the device.
+  // Returns all entries, for the code that builds the device.
   [[nodiscard]] std::map<std::uint32_t, ObjectEntry>& entries() noexcept { return entries_; }
   // Precondition: the entry exists.
   [[nodiscard]] ObjectEntry& at(std::uint16_t index, std::uint8_t subindex = 0);
-  [[nodiscard]] std::int64_t number(std::uint16_t index, std::uint8_t subindex = 0) const noexcept;  // 0: no entry
+  // Returns 0 if there is no such entry.
+  [[nodiscard]] std::int64_t number(std::uint16_t index, std::uint8_t subindex = 0) const noexcept;
 
-  // True if the network finds an object with this index.
+  // True if the dictionary has an object with this index that is visible to the network.
   [[nodiscard]] bool shows(std::uint16_t index) const noexcept;
 
-  // Access from the network. `read` returns the entry; `write` stores the bytes if all checks pass.
+  // Access from the network. read() returns the entry. write() stores the bytes if all checks pass.
   [[nodiscard]] SdoAbort read(std::uint16_t index, std::uint8_t subindex, const ObjectEntry*& entry) const noexcept;
   [[nodiscard]] SdoAbort write(std::uint16_t index, std::uint8_t subindex, std::span<const std::uint8_t> bytes);
-  // The checks of `write` that need no value, for the start of a long transfer. `length` 0: unknown.
+  // Makes those checks of write() that don't need the value, at the start of a long transfer. `length` is 0 if the
+  // length isn't known.
   [[nodiscard]] SdoAbort can_write(std::uint16_t index, std::uint8_t subindex, std::size_t length) const noexcept;
-  // Stores bytes received in a PDO; false if the value is refused. Precondition: they have the entry's length.
+  // Stores bytes that were received in a PDO; false if the value is refused. Precondition: `bytes` has the entry's
+  // length.
   static bool write_mapped(ObjectEntry& entry, std::span<const std::uint8_t> bytes);
 
-  // Restores default values in indices first..last without calling hooks.
+  // Restores the default values of the indices first..last without calling before_write or after_write.
   void restore_defaults(std::uint16_t first, std::uint16_t last) noexcept;
 
  private:

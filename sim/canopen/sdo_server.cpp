@@ -6,8 +6,9 @@ namespace proxarm::sim {
 
 namespace {
 
-constexpr std::uint8_t own_block_size = 127;  // segments that this server accepts in one sub-block; 1..127
-constexpr std::size_t longest_download = std::size_t{1} << 20;  // bytes collected before the object is asked
+constexpr std::uint8_t own_block_size = 127;  // number of segments in a sub-block that this server accepts, 1..127
+// Maximum number of bytes that are collected before the dictionary checks them.
+constexpr std::size_t longest_download = std::size_t{1} << 20;
 
 std::uint32_t u32_at(const SdoServer::Message& m, std::size_t at) noexcept {
   return static_cast<std::uint32_t>(m[at]) | static_cast<std::uint32_t>(m[at + 1]) << 8 |
@@ -33,15 +34,15 @@ std::uint16_t sdo_block_crc(std::span<const std::uint8_t> bytes, std::uint16_t c
 std::span<const SdoServer::Message> SdoServer::on_request(const Message& request) {
   answers_.clear();
   const std::uint8_t command = request[0];
-  if (command == 0x80) {  // abort, also among segments, as none has sequence number 0
+  if (command == 0x80) {  // an abort, which may also come among segments, because no segment has the number 0
     on_abort();
     return answers_;
   }
-  if (phase_ == Phase::block_download) {  // byte 0 is always a sequence number here
+  if (phase_ == Phase::block_download) {  // byte 0 can only be a sequence number here
     block_download_segment(request);
     return answers_;
   }
-  switch (command >> 5) {  // client command specifier
+  switch (command >> 5) {  // bits 5 to 7 hold the client command specifier
     case 0:
       download_segment(request);
       break;
@@ -93,7 +94,7 @@ void SdoServer::abort(SdoAbort code) {
   phase_ = Phase::idle;
 }
 
-// All data received: the dictionary checks and stores them.
+// Ends a download after all data were received: the dictionary checks and stores them.
 void SdoServer::finish_download(const Message& message) {
   phase_ = Phase::idle;
   if (expected_ != 0 && data_.size() != expected_) return abort(SdoAbort::length_does_not_match);
@@ -101,14 +102,15 @@ void SdoServer::finish_download(const Message& message) {
   answer(message);
 }
 
-// 001 x nn e s | index | subindex | data or size       →  60 | index | subindex
+// Begins a download. Request → answer:
+//   001 x nn e s | index | subindex | data or size       →  60 | index | subindex
 void SdoServer::begin_download(const Message& request) {
   remember_object(request);
   const bool expedited = (request[0] & 0x02) != 0, size_indicated = (request[0] & 0x01) != 0;
   const std::size_t unused = static_cast<std::size_t>(request[0] >> 2 & 0x03);
   if (expedited) {
     std::size_t length = 4 - unused;
-    if (!size_indicated) {  // the object's length counts
+    if (!size_indicated) {  // the object's own length is used
       const ObjectEntry* entry = dictionary_.find(index_, subindex_);
       const std::size_t own = entry == nullptr ? 0 : size_of(entry->type);
       length = own == 0 || own > 4 ? 4 : own;
@@ -128,7 +130,8 @@ void SdoServer::begin_download(const Message& request) {
   answer(object_message(0x60));
 }
 
-// 000 t nnn c | data                                    →  001 t 0000
+// Receives a segment of a download. Request → answer:
+//   000 t nnn c | data                                    →  001 t 0000
 void SdoServer::download_segment(const Message& request) {
   if (phase_ != Phase::segmented_download) return abort(SdoAbort::command_specifier_not_valid);
   const std::uint8_t toggle = request[0] >> 4 & 0x01;
@@ -144,7 +147,8 @@ void SdoServer::download_segment(const Message& request) {
   answer(message);
 }
 
-// 40 | index | subindex      →  010 0 nn 1 1 | index | subindex | data,  or  41 | index | subindex | size
+// Begins an upload. Request → expedited or segmented answer:
+//   40 | index | subindex      →  010 0 nn 1 1 | index | subindex | data,  or  41 | index | subindex | size
 void SdoServer::begin_upload(const Message& request) {
   remember_object(request);
   const ObjectEntry* entry = nullptr;
@@ -168,7 +172,8 @@ void SdoServer::initiate_upload_answer() {
   answer(message);
 }
 
-// 011 t 0000                                            →  000 t nnn c | data
+// Sends a segment of an upload. Request → answer:
+//   011 t 0000                                            →  000 t nnn c | data
 void SdoServer::upload_segment(const Message& request) {
   if (phase_ != Phase::segmented_upload) return abort(SdoAbort::command_specifier_not_valid);
   const std::uint8_t toggle = request[0] >> 4 & 0x01;
@@ -184,7 +189,8 @@ void SdoServer::upload_segment(const Message& request) {
   answer(message);
 }
 
-// 110 0 0 cc s 0 | index | subindex | size              →  101 0 0 sc 00 | index | subindex | segments per sub-block
+// Begins a block download. Request → answer:
+//   110 0 0 cc s 0 | index | subindex | size              →  101 0 0 sc 00 | index | subindex | segments per sub-block
 void SdoServer::begin_block_download(const Message& request) {
   remember_object(request);
   with_crc_ = (request[0] & 0x04) != 0;
@@ -202,8 +208,9 @@ void SdoServer::begin_block_download(const Message& request) {
   answer(message);
 }
 
-// c sequence | data      →  at the end of a sub-block: A2 | last sequence number in order | segments per sub-block
-// Segments out of order are ignored; the acknowledgement makes the client repeat them.
+// Receives a segment of a block download. Request → answer at the end of a sub-block:
+//   c sequence | data      →  A2 | last sequence number in order | segments per sub-block
+// Segments out of order are ignored. The answer makes the client repeat them.
 void SdoServer::block_download_segment(const Message& request) {
   const bool last = (request[0] & 0x80) != 0;
   const std::uint8_t sequence = request[0] & 0x7F;
@@ -220,7 +227,8 @@ void SdoServer::block_download_segment(const Message& request) {
   sequence_ = 0;
 }
 
-// 110 nnn 0 1 | crc                                     →  A1
+// Ends a block download. Request → answer:
+//   110 nnn 0 1 | crc                                     →  A1
 void SdoServer::end_block_download(const Message& request) {
   if (phase_ != Phase::block_download_end) return abort(SdoAbort::command_specifier_not_valid);
   const std::size_t unused = static_cast<std::size_t>(request[0] >> 2 & 0x07);
@@ -230,8 +238,9 @@ void SdoServer::end_block_download(const Message& request) {
   finish_download({0xA1, 0, 0, 0, 0, 0, 0, 0});
 }
 
-// 101 0 0 cc 00 | index | subindex | segments | pst     →  110 0 0 sc s 0 | index | subindex | size
-// A value not longer than the protocol switch threshold pst is uploaded without blocks.
+// Begins a block upload. Request → answer:
+//   101 0 0 cc 00 | index | subindex | segments | pst     →  110 0 0 sc s 0 | index | subindex | size
+// If the value isn't longer than the protocol switch threshold pst, it is uploaded without blocks.
 void SdoServer::begin_block_upload(const Message& request) {
   remember_object(request);
   const ObjectEntry* entry = nullptr;
@@ -249,7 +258,10 @@ void SdoServer::begin_block_upload(const Message& request) {
   answer(message);
 }
 
-// A3 start; A2 | last sequence number in order | segments: next sub-block, or the end: 110 nnn 0 1 | crc; A1 confirms.
+// Continues a block upload after a request of the client:
+//   A3                                             →  first sub-block
+//   A2 | last sequence number in order | segments  →  next sub-block, or the end request: 110 nnn 0 1 | crc
+//   A1                                             confirms the end request
 void SdoServer::acknowledge_block_upload(const Message& request) {
   const std::uint8_t subcommand = request[0] & 0x03;
   if (subcommand == 3 && phase_ == Phase::block_upload_start) return send_sub_block();
@@ -274,7 +286,8 @@ void SdoServer::acknowledge_block_upload(const Message& request) {
   answer(message);
 }
 
-// Sends segments (c sequence | data), starting at the first unconfirmed byte.
+// Sends the segments of a sub-block (c sequence | data), beginning with the first byte that the client hasn't
+// confirmed.
 void SdoServer::send_sub_block() {
   std::size_t at = sent_;
   sequence_ = 0;

@@ -1,5 +1,6 @@
-// The SDO server of a simulated CANopen device (CiA 301, 7.2.4): expedited, segmented and block transfers, both ways.
-// Written from the standard, without code of the client in fieldbus, so that each tests the other.
+// The SDO server of a simulated CANopen device (CiA 301, 7.2.4): expedited, segmented and block transfers in both
+// directions. The code was written from the standard and shares no code with the client in fieldbus, so each side tests
+// the other.
 #pragma once
 
 #include <array>
@@ -11,7 +12,7 @@
 
 namespace proxarm::sim {
 
-// CRC of block transfers: x¹⁶ + x¹² + x⁵ + 1, start value 0, no reflection (CiA 301, 7.2.4.3.16).
+// Returns the CRC of block transfers: x¹⁶ + x¹² + x⁵ + 1, start value 0, not reflected (CiA 301, 7.2.4.3.16).
 [[nodiscard]] std::uint16_t sdo_block_crc(std::span<const std::uint8_t> bytes, std::uint16_t crc = 0) noexcept;
 
 class SdoServer {
@@ -20,12 +21,12 @@ class SdoServer {
 
   explicit SdoServer(ObjectDictionary& dictionary) : dictionary_(dictionary) {}
 
-  // Handles the eight bytes of a request and returns the messages to be sent, in order: none, one, or a whole sub-block
-  // of a block upload. Valid until the next call. Any bytes are safe. A request that begins a transfer ends the
-  // previous one.
+  // Handles the eight bytes of a request, which may be any bytes. Returns the messages to be sent, in order: none, one,
+  // or a complete sub-block of a block upload. The messages are valid until the next call. A request that begins a
+  // transfer ends the transfer before.
   [[nodiscard]] std::span<const Message> on_request(const Message& request);
 
-  // Communication reset: ends a transfer in progress.
+  // Resets the communication: ends a transfer in progress.
   void reset() noexcept { phase_ = Phase::idle; }
 
  private:
@@ -33,11 +34,11 @@ class SdoServer {
     idle,
     segmented_download,
     segmented_upload,
-    block_download,      // receiving segments
-    block_download_end,  // all segments received, waiting for the end request with the CRC
-    block_upload_start,  // initiate request answered, waiting for the start
-    block_upload,        // sub-block sent, waiting for its acknowledgement
-    block_upload_end,    // end request sent, waiting for its confirmation
+    block_download,      // segments are being received
+    block_download_end,  // all segments were received; the end request with the CRC is awaited
+    block_upload_start,  // the initiate request was answered; the start request is awaited
+    block_upload,        // a sub-block was sent; its acknowledgement is awaited
+    block_upload_end,    // the end request was sent; its confirmation is awaited
   };
 
   void on_abort() noexcept { phase_ = Phase::idle; }
@@ -65,12 +66,12 @@ class SdoServer {
   Phase phase_ = Phase::idle;
   std::uint16_t index_ = 0;
   std::uint8_t subindex_ = 0;
-  std::vector<std::uint8_t> data_;  // received so far, or to be sent
-  std::size_t expected_ = 0;        // bytes announced by the client; 0: not announced
-  std::size_t sent_ = 0;            // bytes of data_ that the client has confirmed
+  std::vector<std::uint8_t> data_;  // bytes received so far, or bytes to be sent
+  std::size_t expected_ = 0;        // number of bytes that the client has announced; 0: not announced
+  std::size_t sent_ = 0;            // number of bytes of data_ that the client has confirmed
   std::uint8_t toggle_ = 0;
   std::uint8_t block_size_ = 0;  // segments per sub-block
-  std::uint8_t sequence_ = 0;    // last segment received in order, or last one sent
+  std::uint8_t sequence_ = 0;    // number of the last segment received in order, or sent
   bool with_crc_ = false;
 };
 

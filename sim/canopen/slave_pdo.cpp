@@ -9,7 +9,7 @@ namespace {
 constexpr std::int64_t not_valid = std::int64_t{1} << 31;
 constexpr std::int64_t flag_bits = std::int64_t{7} << 29;
 
-// Identifiers that no PDO may use (CiA 301, table 42).
+// True for the identifiers that no PDO may use (CiA 301, table 42).
 bool is_restricted(std::int64_t id) noexcept {
   return id <= 0x07F || (id >= 0x101 && id <= 0x180) || (id >= 0x581 && id <= 0x5FF) || (id >= 0x601 && id <= 0x67F) ||
          (id >= 0x6E0 && id <= 0x6FF) || id >= 0x701;
@@ -85,7 +85,8 @@ SdoAbort SlavePdo::resolve(std::uint32_t object, Mapped& mapped) const noexcept 
   const auto index = static_cast<std::uint16_t>(object >> 16);
   const auto subindex = static_cast<std::uint8_t>(object >> 8);
   const std::uint32_t bits = object & 0xFF;
-  if (direction_ == Direction::receive && index >= 1 && index <= 7 && subindex == 0) {  // dummy: its bytes are skipped
+  // A dummy entry: its bytes in the PDO are skipped.
+  if (direction_ == Direction::receive && index >= 1 && index <= 7 && subindex == 0) {
     const std::size_t size = size_of(static_cast<DataType>(index));
     if (bits != 8 * size) return SdoAbort::object_cannot_be_mapped;
     mapped = {nullptr, static_cast<std::uint8_t>(size)};
@@ -102,7 +103,8 @@ SdoAbort SlavePdo::resolve(std::uint32_t object, Mapped& mapped) const noexcept 
   return SdoAbort::none;
 }
 
-// Bits 0..29 can't change while the PDO is valid; 29-bit identifiers (bit 29) aren't supported.
+// Checks a new value of the identifier object. Bits 0..29 can't change while the PDO is valid. 29-bit identifiers (bit
+// 29) aren't supported.
 SdoAbort SlavePdo::check_identifier(std::int64_t value) const noexcept {
   const std::int64_t id = value & ~flag_bits, present = dictionary_.number(parameters_, 1);
   if ((value >> 29 & 1) != 0 || id > 0x7FF) return SdoAbort::invalid_value;
@@ -116,7 +118,8 @@ SdoAbort SlavePdo::check_type(std::int64_t value) const noexcept {
   return value <= 240 || value >= 254 ? SdoAbort::none : SdoAbort::invalid_value;
 }
 
-// The mapping can only change while the PDO isn't valid. It takes effect when its number of objects is written.
+// Checks a new number of mapped objects. The mapping can change only while the PDO isn't valid. A changed mapping takes
+// effect when the number of its objects is written.
 SdoAbort SlavePdo::check_count(std::int64_t value) const noexcept {
   if ((dictionary_.number(parameters_, 1) & not_valid) == 0) return SdoAbort::unsupported_access;
   if (value > most_) return SdoAbort::pdo_length_exceeded;
@@ -133,7 +136,7 @@ SdoAbort SlavePdo::check_count(std::int64_t value) const noexcept {
 SdoAbort SlavePdo::check_object(std::int64_t value) const noexcept {
   const bool valid = (dictionary_.number(parameters_, 1) & not_valid) == 0;
   if (valid || dictionary_.number(mapping_, 0) != 0) return SdoAbort::unsupported_access;
-  if (value == 0) return SdoAbort::none;  // unused entry
+  if (value == 0) return SdoAbort::none;  // 0 marks an unused entry
   Mapped mapped;
   return resolve(static_cast<std::uint32_t>(value), mapped);
 }

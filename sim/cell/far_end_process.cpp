@@ -14,9 +14,10 @@ namespace {
 
 using description::SetupError;
 
-constexpr std::int64_t longest_sleep = 20'000'000;  // so that the stop flag is noticed
+constexpr std::int64_t longest_sleep = 20'000'000;  // limits how late the stop flag is noticed
 
-// True for the identifiers that a drive uses of its predefined connection set, and those for all drives (node 0).
+// True for the identifiers of the predefined connection set that this drive uses, and for identifiers that all drives
+// use (node 0).
 bool is_used_by(std::uint8_t node, std::uint32_t id) noexcept {
   const std::uint32_t base = id & 0x780, number = id & 0x7F;
   if (number == 0) return base == 0x000 || base == 0x080;
@@ -25,14 +26,14 @@ bool is_used_by(std::uint8_t node, std::uint32_t id) noexcept {
 
 std::vector<std::uint32_t> sensor_ids(const description::Cell& cell, const description::SensorDescription& sensor) {
   std::vector<std::uint32_t> ids;
-  if (sensor.described && sensor.described->registers) return ids;  // on Modbus
+  if (sensor.described && sensor.described->registers) return ids;  // the sensor is on Modbus
   if (sensor.described && !sensor.described->extended) return sensor.described->wire_ids(cell.sensor.base_id);
-  if (sensor.described) return ids;  // 29 bits: can't collide with a drive
+  if (sensor.described) return ids;  // 29-bit identifiers can't collide with a drive's
   for (std::uint32_t operation = 0; operation < 16; ++operation) ids.push_back(cell.sensor.base_id << 4 | operation);
   return ids;
 }
 
-// Two drives with one node number on one interface would both answer each request.
+// Throws SetupError if two drives on one interface have the same node number, because both would answer each request.
 void check_nodes(const description::Cell& cell, const description::SensorDescription& sensor,
                  const std::vector<std::size_t>& interface_of_bus) {
   if (interface_of_bus.size() != cell.buses.size()) {
@@ -107,7 +108,7 @@ void FarEndProcess::run(const std::atomic<bool>& stop, std::int64_t until_ns) {
     cell_->power_on();
     powered_ = true;
   }
-  // One reading of the clock per round: if it is a system call, it costs most of a round.
+  // Read the clock only once per round: if reading it is a system call, that call takes most of the round.
   for (std::int64_t now_ns = network_.now_ns(); now_ns < until_ns && !stop.load(std::memory_order_relaxed);) {
     network_.wait_for_frame(std::min({events_.next_time(), until_ns, now_ns + longest_sleep}));
     ++statistics_.wake_ups;
@@ -123,8 +124,8 @@ void FarEndProcess::receive_all(std::int64_t now_ns) {
   }
 }
 
-// First runs the events that were due before the frame. A time stamp ahead of the clock, or before the time already
-// simulated, is corrected.
+// Delivers a frame to the nodes of its interface, after the events that were due before the frame. A time stamp later
+// than now_ns or earlier than the time already simulated is corrected to that time.
 void FarEndProcess::deliver(std::size_t interface, const fieldbus::TimedFrame& timed, std::int64_t now_ns) {
   ++statistics_.frames_received;
   const std::int64_t time_ns = std::max(std::min(timed.time_ns, now_ns), events_.now_ns());

@@ -1,4 +1,4 @@
-// One axis of the simulated arm for its drive: in encoder counts, with simulated faults of motor and encoder.
+// One axis of the simulated arm as its drive sees it: in encoder counts, with simulated faults of motor and encoder.
 #pragma once
 
 #include <cmath>
@@ -51,7 +51,8 @@ class PlantAxis final : public ServoAxis {
   [[nodiscard]] bool limited() const noexcept override { return servo_.limited(); }
   [[nodiscard]] bool at_rest() const noexcept override { return servo_.at_rest(); }
 
-  // Faults of how the drive uses its targets, of its motor's torque and of its encoder; false for other faults.
+  // Sets a fault of the motor's torque, of the encoder, or of how the drive uses its targets. False for any other
+  // fault.
   bool set_fault(const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept;
 
  private:
@@ -62,8 +63,10 @@ class PlantAxis final : public ServoAxis {
   ServoLoop& servo_;
   double counts_per_rad_, rated_torque_Nm_, max_torque_Nm_;
   double runaway_counts_per_s_ = 0.0;
-  std::int32_t target_share_ = 1;  // factor on the way from since_counts_ to a target; on torques, 0 keeps the last
-  double torque_ratio_ = 0.0;      // requested of the motor
+  // Factor on the difference between a target and since_counts_. A torque is multiplied by it; if it is 0, the last
+  // torque is kept.
+  std::int32_t target_share_ = 1;
+  double torque_ratio_ = 0.0;  // torque requested from the motor, as a share of the rated torque
   std::int32_t since_counts_ = 0, offset_counts_ = 0, stuck_at_counts_ = 0;
   std::int64_t since_ns_ = 0;
   bool stuck_ = false;

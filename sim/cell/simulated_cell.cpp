@@ -15,7 +15,7 @@ namespace {
 
 using description::SetupError;
 
-// Factory setting of 6065h, at the joint. The master may change it.
+// Factory setting of the following error window (6065h), in radians at the joint. The master may change it.
 constexpr double following_error_window_rad = 0.05;
 
 double counts_per_rad(const description::DriveDescription& drive) noexcept { return std::abs(drive.counts_per_rad()); }
@@ -28,7 +28,7 @@ std::int32_t to_i32(double value) noexcept {
   return static_cast<std::int32_t>(std::clamp(std::nearbyint(value), -2147483648.0, 2147483647.0));
 }
 
-// Identity by the maker's file: [DeviceInfo], else the defaults of 1018h.
+// Takes the drive's identity from the maker's file: from [DeviceInfo], or else from the defaults of 1018h.
 void take_identity(const description::EdsFile& eds, CanopenSlaveConfig& canopen) {
   const auto number = [&eds](std::optional<std::uint32_t> of_device, std::uint32_t object) -> std::uint32_t {
     const description::EdsObject* there = eds.find(object);
@@ -55,7 +55,7 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   DriveDeviceConfig c;
   c.canopen.node = drive.node;
   c.canopen.fd = drive.fd;
-  constexpr std::uint32_t servo_drive = 0x00020192;  // 1000h
+  constexpr std::uint32_t servo_drive = 0x00020192;  // value of 1000h
   const description::EdsObject* type = eds == nullptr ? nullptr : eds->find(0x100000);
   c.canopen.device_type =
       drive.device_type.value_or(type == nullptr ? servo_drive : type->default_value.value_or(servo_drive));
@@ -92,7 +92,7 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   return c;
 }
 
-// Faults of objects: missing, read-only, another value, or a refused value.
+// Applies faults of objects: an object is missing or read-only, has another value, or refuses a value.
 void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
   constexpr DeviceFaultKind of_objects[] = {DeviceFaultKind::object_missing, DeviceFaultKind::object_fixed,
                                             DeviceFaultKind::object_holds, DeviceFaultKind::value_refused};
@@ -120,7 +120,7 @@ void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
   }
 }
 
-// The drive accepts mapped objects only while a mode is set.
+// Makes the drive refuse mapped objects until a mode is set.
 void map_only_in_a_mode(ObjectDictionary& dictionary) {
   constexpr std::uint16_t mappings[] = {0x1600, 0x1A00};
   for (const std::uint16_t mapping : mappings) {
@@ -146,7 +146,7 @@ std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cel
   return buses;
 }
 
-// ---- Devices' access to the physics
+// ---- How devices access the physics
 
 class SimulatedCell::PlantGauges final : public GaugeSource {
  public:
@@ -170,7 +170,7 @@ class SimulatedCell::WirelessModbus final : public fieldbus::ModbusClient {
       if (device->unit() != request.bytes[0]) continue;
       if (device->fault() == ModbusFault::closed) return fieldbus::ModbusResult::closed;
       const std::vector<std::uint8_t> bytes = device->serve(request.span());
-      // After half an answer, the master waits for the rest until its timeout.
+      // If only half an answer comes, the master waits for the rest until its timeout.
       if (bytes.empty() || device->fault() == ModbusFault::half) return fieldbus::ModbusResult::timeout;
       std::copy(bytes.begin(), bytes.end(), answer.bytes.begin());
       answer.size = bytes.size();
@@ -263,7 +263,7 @@ void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& confi
   }
 }
 
-// The switch is wired to a drive's inputs, or is a node with a message.
+// Adds the enabling switch. It is either wired to a drive's inputs or a node of its own that sends a message.
 void SimulatedCell::add_enabling(const std::vector<PressedSpan>& spans) {
   if (!cell_.enabling_input) return;
   const description::EnablingInputDescription& input = *cell_.enabling_input;
@@ -410,7 +410,7 @@ void SimulatedCell::tick(std::int64_t time_ns) noexcept {
   }
 }
 
-// A streaming sensor's clock runs independently of the bus.
+// Makes a streaming sensor send its next sample. The sensor's clock doesn't depend on the bus.
 void SimulatedCell::convert(std::int64_t time_ns) noexcept {
   advance_to(time_ns);
   described_sensor_->on_converter(time_ns);

@@ -1,4 +1,4 @@
-// The faults of a simulated cell's devices, and their schedule: part of SimulatedCell.
+// The part of SimulatedCell that applies and schedules the faults of the simulated devices.
 #include <algorithm>
 #include <iterator>
 #include <utility>
@@ -13,7 +13,7 @@ using description::SetupError;
 
 namespace {
 
-// Refuses faults that would have no effect on this sensor.
+// Throws SetupError for a fault that would have no effect on this sensor.
 void require_fault_of_sensor(const DeviceFault& fault, const description::SensorDescription& sensor) {
   require_known_fault(fault, FaultyDevice::sensor);
   const bool described = sensor.described.has_value();
@@ -42,7 +42,8 @@ void require_fault_of_sensor(const DeviceFault& fault, const description::Sensor
   }
 }
 
-// A torque setpoint has no position that could run away.
+// Throws SetupError for "runaway" in torque mode: a torque setpoint has no position from which the drive could run
+// away.
 void require_fault_of_mode(const DeviceFault& fault, const description::DriveDescription& drive) {
   if (fault.kind != DeviceFaultKind::runaway || drive.mode != "cst") return;
   throw SetupError({.key = "--fault",
@@ -68,7 +69,7 @@ constexpr std::pair<DeviceFaultKind, ModbusFault> modbus_faults[] = {
     {DeviceFaultKind::modbus_not_driven, ModbusFault::not_driven},
     {DeviceFaultKind::modbus_tripped, ModbusFault::tripped}};
 
-// Deviations of a drive on the wire.
+// Sets how a drive deviates on the wire.
 void set_quirk(SlaveQuirks& quirks, const DeviceFault& fault, bool on) noexcept {
   switch (fault.kind) {
     case DeviceFaultKind::heartbeat_lost:

@@ -8,9 +8,10 @@ namespace proxarm::sim {
 namespace {
 
 constexpr std::uint8_t newton = 2, newton_metre = 3;
-constexpr std::uint8_t calibrations = 1;  // stored in this sensor
+constexpr std::uint8_t calibrations = 1;  // number of calibrations stored in this sensor
 constexpr std::uint16_t any_error = 0x8000;
-constexpr std::array<std::uint16_t, 6> voltages{2048, 2048, 3100, 2900, 2048, 1024};  // plausible, in ADC counts
+// Plausible converter voltages in ADC counts.
+constexpr std::array<std::uint16_t, 6> voltages{2048, 2048, 3100, 2900, 2048, 1024};
 
 void put_u16(std::span<std::uint8_t> to, std::size_t at, std::uint16_t value) noexcept {
   to[at] = static_cast<std::uint8_t>(value >> 8);

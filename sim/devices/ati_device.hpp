@@ -1,17 +1,18 @@
 // A simulated ATI Net CAN OEM force/torque sensor: answers the requests of the maker's protocol.
 //
-// Identifier = base << 4 | operation; all numbers big-endian. Request and answer both have the operation's identifier:
+// Identifier = base << 4 | operation; all numbers are big-endian. A request has its operation's identifier, and so has
+// each frame of the answer:
 //   request            answers
 //   0  (empty)         0: status u16, SG0, SG2, SG4 (i16)      1: SG1, SG3, SG5 (i16)
 //   2  row u8, 0..5    2, 3, 4: two floats each, the row of the calibration matrix
 //   5  (empty)         5: serial number, 8 characters
-//   6  index u8        6: index of the calibration now active
-//   7  (empty)         7: counts per unit of force u32, of torque u32
+//   6  index u8        6: index of the calibration that is now active
+//   7  (empty)         7: counts per unit of force u32, counts per unit of torque u32
 //   8  (empty)         8: unit of force u8 (2 is N), unit of torque u8 (3 is Nm)
 //   9  index u8        9: converter voltage u16
-//   C  (empty)         none: the sensor restarts
+//   C  (empty)         no answer: the sensor restarts
 //   F  (empty)         F: major u8, minor u8, build u16
-// Wrench = matrix · (SG − bias) / counts. Other frames get no answer.
+// Wrench = matrix · (SG − bias) / counts per unit. Other frames get no answer.
 #pragma once
 
 #include <array>
@@ -32,7 +33,7 @@ class GaugeSource {
   GaugeSource& operator=(const GaugeSource&) = delete;
   virtual ~GaugeSource() = default;
 
-  // The latest finished sample at this time.
+  // Returns the latest sample that is finished at time_ns.
   [[nodiscard]] virtual std::array<std::int16_t, 6> gauges(std::int64_t time_ns) noexcept = 0;
 };
 
@@ -41,9 +42,9 @@ struct AtiDeviceConfig {
   std::array<std::array<float, 6>, 6> matrix{};
   std::uint32_t counts_per_force = 1'000'000;
   std::uint32_t counts_per_torque = 1'000'000;
-  std::string serial_number = "SIM00001";   // cut or padded with blanks to 8
-  std::int64_t answer_time_ns = 30'000;     // from a request to its answer
-  std::int64_t start_time_ns = 10'000'000;  // from power on or reset to the first answer
+  std::string serial_number = "SIM00001";   // cut, or padded with blanks, to 8 characters
+  std::int64_t answer_time_ns = 30'000;     // time from a request to its answer
+  std::int64_t start_time_ns = 10'000'000;  // time from power on or reset to the first answer
 };
 
 class AtiDevice final : public BusDevice {

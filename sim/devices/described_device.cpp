@@ -15,7 +15,7 @@ using description::NumberKind;
 using description::SensorCommand;
 using fieldbus::CanFrame;
 
-// Bytes of a command's first frame: at most eight.
+// Returns the number of bytes in a command's first frame, which is at most eight.
 std::size_t first_bytes(const SensorCommand& command) { return std::min<std::size_t>(command.data.size(), 8); }
 
 bool is_value_byte(const SensorCommand& command, std::size_t at) noexcept {
@@ -91,7 +91,8 @@ void DescribedDevice::on_frame(const CanFrame& frame, std::int64_t time_ns) noex
   if (frame.error || frame.remote || frame.extended != protocol_.extended || frame.fd != protocol_.fd) return;
   if (time_ns < ready_ns_ || faults_.silent) return;
   if (is(protocol_.poll, frame)) return send_sample(time_ns + config_.answer_time_ns);
-  // In the order of a master's commands: if stop and rate differ only in the value, 0 means stop.
+  // The commands are checked in the order in which a master sends them. If stop and rate differ only in the value, the
+  // value 0 means stop.
   if (is(protocol_.start, frame)) {
     streaming_ = true;
   } else if (is(protocol_.stop, frame)) {
@@ -112,7 +113,8 @@ void DescribedDevice::on_converter(std::int64_t time_ns) noexcept {
   if (streaming_ && time_ns >= ready_ns_ && !faults_.silent) send_sample(time_ns);
 }
 
-// Bit i of the number is `shift + i` bits above the lowest bit of its lowest byte.
+// Stores the value at the number's place in the sample. Bit i of the number is `shift + i` bits above the lowest bit of
+// the number's lowest byte.
 void DescribedDevice::put(const NumberField& number, std::uint64_t value) noexcept {
   for (int i = 0; i < number.bits; ++i) {
     const auto above = static_cast<std::size_t>(number.shift + i);
@@ -153,7 +155,7 @@ void DescribedDevice::fill_checksum() noexcept {
     } else if (rule.kind == ChecksumKind::xor8) {
       sum ^= sample_[at];
     } else {
-      // Long division: appends eight bits to the remainder of the bytes so far.
+      // Long division: appends eight bits to the remainder of the bytes before.
       for (int bit = 7; bit >= 0; --bit) {
         const bool top = ((sum >> (width - 1)) & 1U) != (static_cast<std::uint64_t>(sample_[at]) >> bit & 1U);
         sum = (sum << 1 & ((std::uint64_t{1} << width) - 1)) ^ (top ? rule.polynomial : 0U);

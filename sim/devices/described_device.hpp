@@ -1,8 +1,8 @@
-// A simulated force sensor that follows a description file (models/description/sensor_protocol.hpp): the device for
-// DescribedSensor, with which it shares no code.
+// A simulated force sensor that follows a description file (models/description/sensor_protocol.hpp). It is the device
+// for DescribedSensor, with which it shares no code.
 //
-// It streams by its own clock or answers polls. It obeys commands with the file's bytes: rate, start, stop, bias and
-// clearing the bias. Without a start command, it streams from power on.
+// The sensor streams by its own clock or answers polls. It obeys commands whose bytes are those in the file: rate,
+// start, stop, bias and clearing the bias. If the file has no start command, the sensor streams from power on.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace proxarm::sim {
 
-// The measuring part: the wrench at a time, fx fy fz (N), tx ty tz (Nm).
+// The measuring part of the sensor. wrench() returns the wrench at time_ns: fx fy fz (N), tx ty tz (Nm).
 class WrenchSource {
  public:
   WrenchSource() = default;
@@ -27,13 +27,14 @@ class WrenchSource {
 
 struct DescribedDeviceConfig {
   std::uint32_t base_id = 0;
-  std::int64_t answer_time_ns = 30'000;     // from a poll to the first frame of its answer
-  std::int64_t start_time_ns = 10'000'000;  // from power on
+  std::int64_t answer_time_ns = 30'000;     // time from a poll to the first frame of the answer
+  std::int64_t start_time_ns = 10'000'000;  // time from power on until the sensor works
 };
 
 class DescribedDevice final : public BusDevice {
  public:
-  // Throws SetupError for a singular matrix: the wrench must determine the signals.
+  // Throws SetupError if the matrix is singular, because the signals are computed from the wrench by the inverse
+  // matrix.
   DescribedDevice(const description::SensorDescription& sensor, const DescribedDeviceConfig& config,
                   WrenchSource& source, DevicePort& port);
 
@@ -41,7 +42,7 @@ class DescribedDevice final : public BusDevice {
   void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
   void on_time(std::int64_t) noexcept override {}
 
-  // A sample is finished; call every period_ns().
+  // Ends the conversion of a sample and sends the sample if the sensor streams. Must be called every period_ns().
   void on_converter(std::int64_t time_ns) noexcept;
   [[nodiscard]] bool fd() const noexcept { return protocol_.fd; }
   [[nodiscard]] std::int64_t period_ns() const noexcept { return period_ns_; }
@@ -65,9 +66,9 @@ class DescribedDevice final : public BusDevice {
   DevicePort& port_;
   SensorFaults faults_;
   std::vector<std::uint8_t> sample_;
-  std::vector<std::array<double, 6>> signals_of_wrench_;  // inverse of the matrix, by rows
+  std::vector<std::array<double, 6>> signals_of_wrench_;  // inverse of the matrix, row by row
   std::array<double, 6> measured_{}, bias_{};
-  std::array<double, 6> numbers_{};  // signals of the last sample
+  std::array<double, 6> numbers_{};  // the signals of the last sample
   std::uint64_t count_ = 0, frames_ = 0;
   std::int64_t period_ns_ = 0, ready_ns_ = INT64_MAX;
   bool streaming_ = false;

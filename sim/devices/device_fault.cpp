@@ -13,7 +13,7 @@ namespace {
 
 using description::SetupError;
 
-constexpr unsigned can = 1, modbus = 2, drives = can | modbus, sensor = 4;  // FaultyDevice
+constexpr unsigned can = 1, modbus = 2, drives = can | modbus, sensor = 4;  // bits of FaultyDevice
 constexpr std::uint64_t none = 0, u16 = 0xFFFF, u24 = 0xFFFFFF, u32 = 0xFFFFFFFF, last_channel = 5, last_mode = 10,
                         longest_late_ms = 10'000, last_exception = 11, classic_bytes = 8;
 constexpr std::uint32_t refused_by_value = 0x06090030;
@@ -21,10 +21,11 @@ using ParseAmount = double (*)(std::string_view text, std::string_view option);
 
 struct KindName {
   const char* name;
-  unsigned devices;  // that can have it
+  unsigned devices;  // devices that can have the fault, as bits
   DeviceFaultKind kind;
-  std::uint64_t most;                  // of its value; `none`: without a value
-  ParseAmount parse_amount = nullptr;  // for a kind with a quantity instead
+  // Maximum of the fault's VALUE; `none`: the fault has no VALUE.
+  std::uint64_t most;
+  ParseAmount parse_amount = nullptr;  // parses the AMOUNT of a fault that has one instead of a VALUE
   bool is_signed = false;
 };
 
@@ -131,7 +132,7 @@ double parse_amount(const KindName& kind, std::string_view text) {
   return negative ? -amount : amount;
 }
 
-// OBJECT:CONTENT; the abort code of a refused object is optional.
+// Parses OBJECT:CONTENT. For `refuses`, CONTENT (the abort code) is optional.
 void parse_object(std::string_view all, std::string_view text, const KindName& kind, DeviceFault& fault) {
   const std::size_t colon = text.find(':');
   const bool holds = kind.kind == DeviceFaultKind::object_holds, refuses = kind.kind == DeviceFaultKind::value_refused;

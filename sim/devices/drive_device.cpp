@@ -13,8 +13,8 @@ namespace {
 constexpr std::int64_t interpolated_position = 7, cyclic_synchronous_position = 8, cyclic_synchronous_torque = 10;
 constexpr std::int64_t modes[] = {interpolated_position, cyclic_synchronous_position, cyclic_synchronous_torque};
 constexpr std::int64_t homing_mode = 6;
-constexpr std::uint16_t homing_start = 1U << 4;          // of the controlword, in mode 6
-constexpr std::uint16_t interpolation_active = 1U << 4;  // of the controlword, in mode 7
+constexpr std::uint16_t homing_start = 1U << 4;          // bit of the controlword in mode 6
+constexpr std::uint16_t interpolation_active = 1U << 4;  // bit of the controlword in mode 7
 
 bool is_cyclic(std::int64_t mode) noexcept {
   return std::find(std::begin(modes), std::end(modes), mode) != std::end(modes);
@@ -104,7 +104,8 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   add_own_objects(config);
 }
 
-// Not in a maker's dictionary, which has other objects there.
+// Adds 2001h and 2010h:01, which only a drive with the default dictionary shows: a maker's dictionary has other objects
+// there.
 void DriveDevice::add_own_objects(const DriveDeviceConfig& config) {
   using enum DataType;
   using enum Access;
@@ -128,7 +129,7 @@ ObjectEntry& DriveDevice::add(std::uint32_t address, DataType type, Access acces
                                  access, value, mappable);
 }
 
-// Reactions of the drive. Ramps that this drive doesn't have are refused.
+// Adds the option codes, which select the drive's reactions. Codes of ramps that this drive doesn't have are refused.
 void DriveDevice::add_option_codes() {
   using enum DataType;
   ObjectDictionary& od = slave_.dictionary();
@@ -137,12 +138,13 @@ void DriveDevice::add_option_codes() {
       return code >= 0 && code < 32 && (allowed >> code & 1) != 0 ? SdoAbort::none : SdoAbort::invalid_value;
     };
   };
-  option(0x6007, 1, 0b1111);     // connection lost: nothing, fault, disable voltage, quick stop
-  option(0x605A, 2, 0b1100111);  // quick stop: off, ramp 6084h, ramp 6085h; 5, 6 the same and stay
-  option(0x605B, 0, 0b11);       // shutdown: off, ramp 6084h
-  option(0x605C, 1, 0b11);       // disable operation: off, ramp 6084h
-  option(0x605D, 1, 0b110);      // halt: ramp 6084h, 6085h (no effect in this mode)
-  option(0x605E, 2, 0b111);      // fault: off, ramp 6084h, ramp 6085h
+  option(0x6007, 1, 0b1111);  // connection lost: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop
+  // Quick stop: 0 off, 1 ramp 6084h, 2 ramp 6085h; 5 and 6 use the ramps of 1 and 2 and stay in quick stop active.
+  option(0x605A, 2, 0b1100111);
+  option(0x605B, 0, 0b11);   // shutdown: 0 off, 1 ramp 6084h
+  option(0x605C, 1, 0b11);   // disable operation: 0 off, 1 ramp 6084h
+  option(0x605D, 1, 0b110);  // halt: 1 ramp 6084h, 2 ramp 6085h (no effect in cyclic modes)
+  option(0x605E, 2, 0b111);  // fault: 0 off, 1 ramp 6084h, 2 ramp 6085h
 }
 
 void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
@@ -187,7 +189,8 @@ void DriveDevice::add_homing_objects() {
   od.add(0x609A, 0, unsigned32, read_write, 0);
 }
 
-// Zero of the encoder at power on: CiA 402 has no position from before.
+// Sets the encoder's zero at power on. An incremental encoder that wasn't homed has its zero at the current position,
+// because CiA 402 keeps no position from before power on.
 void DriveDevice::power_on_encoder() noexcept {
   homing_ = HomingState::none;
   if (!incremental_) return;
@@ -196,7 +199,7 @@ void DriveDevice::power_on_encoder() noexcept {
 
 bool DriveDevice::homes() const noexcept { return mode_->number() == homing_mode && incremental_.has_value(); }
 
-// Methods 1 to 34 look for a switch, a stop or an index pulse; here all find the same place.
+// Starts homing. Methods 1 to 34 look for a switch, a stop or an index pulse; here they all find the same place.
 void DriveDevice::start_homing() {
   const std::int64_t method = slave_.dictionary().number(0x6098);
   const bool known = method >= 1 && method <= 34 && slave_.dictionary().number(0x6099, 1) > 0;
@@ -221,7 +224,8 @@ void DriveDevice::advance_homing() {
   axis_.set_target(static_cast<std::int32_t>(homing_counts_), now_ns_);
   const double settled_counts = std::max(1.0, 0.02 * static_cast<double>(following_window_->number()));
   if (homing_counts_ != home || std::abs(axis_.position_counts() - home) > settled_counts) return;
-  zero_counts_ = incremental_->home_counts + slave_.dictionary().number(0x607C);  // 607Ch: from home to zero
+  // 607Ch is the offset from the home position to the zero
+  zero_counts_ = incremental_->home_counts + slave_.dictionary().number(0x607C);
   homing_ = HomingState::attained;
 }
 
@@ -238,7 +242,8 @@ void DriveDevice::on_sync(std::int64_t time_ns) {
   publish();
 }
 
-// Without a new one, the last torque acts on, until the receive PDO's timer or the SYNC watch ends it.
+// Applies the target torque. If no new torque came, the last torque acts until the receive PDO's timer or the SYNC
+// watch ends it.
 void DriveDevice::latch_torque() {
   following_ = false;
   if (state_ != DriveState::operation_enabled || stopping_ || !brake_open()) return;
@@ -249,7 +254,8 @@ void DriveDevice::latch_torque() {
   following_ = true;
 }
 
-// Position limits (607Dh) clamp the target. If no PDO came, so that 607Ah is old, the axis decelerates instead.
+// Applies the target position. Position limits (607Dh) clamp the target. If no PDO came since the last SYNC, 607Ah is
+// old, and the axis decelerates instead.
 void DriveDevice::latch_target() {
   if (mode_->number() == cyclic_synchronous_torque) return latch_torque();
   if (homes()) return;
@@ -265,7 +271,8 @@ void DriveDevice::latch_target() {
   std::int64_t target = (interpolates ? interpolated_target_ : target_)->number();
   target_limited_ = low < high && (target < low || target > high);
   if (target_limited_) target = std::clamp(target, low, high);
-  // The first target after the brake has opened must be at the actual position, so that nothing jumps.
+  // The first target after the brake has opened must be within the following error window of the actual position, so
+  // that the axis doesn't jump.
   if (!target_taken_ && std::llabs(target - position()) > following_window_->number()) {
     return trip(emcy::following_error, error_register::profile_specific);
   }
@@ -275,7 +282,7 @@ void DriveDevice::latch_target() {
   following_ = !target_limited_;
 }
 
-// Updates the values that PDOs and SDOs read.
+// Updates the objects that PDOs and SDOs read.
 void DriveDevice::publish() noexcept {
   position_->set(position());
   demand_->set(demand());
@@ -288,7 +295,8 @@ void DriveDevice::publish() noexcept {
   statusword_->set(statusword());
 }
 
-// Bits 4 voltage enabled, 7 warning, 9 remote, 11 internal limit, 12 follows the target, 13 following error.
+// Returns the statusword. Besides the state it has these bits: 4 voltage enabled, 7 warning, 9 remote, 11 internal
+// limit, 12 the drive follows the target, 13 following error.
 std::uint16_t DriveDevice::statusword() const noexcept {
   unsigned word = statusword_bits(state_) | 0x0010u;
   const NmtState nmt = slave_.state();
@@ -327,12 +335,12 @@ void DriveDevice::on_controlword() {
   const DriveCommand command = decode_controlword(word, controlword_before_);
   controlword_before_ = word;
   if (command == DriveCommand::disable_voltage && is_moving_state(state_) && stopping_) {
-    stopping_ = false;  // disable voltage takes the power even during a ramp
+    stopping_ = false;  // disable voltage switches the power off even during a ramp
     if (state_ == DriveState::fault_reaction_active) return enter(DriveState::fault, 14);
   }
   if (stopping_) return;
   if (sto_open_ && command != DriveCommand::fault_reset) return;
-  for (int step = 0; step < 2; ++step) {  // 3 and 4 together if operation is commanded at once
+  for (int step = 0; step < 2; ++step) {  // transitions 3 and 4 are taken together if operation is commanded at once
     const DriveTransition transition = transition_for(state_, command);
     if (transition.number == 0) break;
     execute(transition);
@@ -362,13 +370,13 @@ void DriveDevice::execute(DriveTransition transition) {
       if (option == 0) return enter(DriveState::switch_on_disabled, 12);
       const double ramp = deceleration(option == 1 || option == 5 ? 0x6084 : 0x6085);
       enter(DriveState::quick_stop_active, 11);
-      if (option >= 5) return axis_.stop(ramp, now_ns_);  // stays in quick stop active
+      if (option >= 5) return axis_.stop(ramp, now_ns_);  // the drive stays in quick stop active
       return begin_stop(DriveState::switch_on_disabled, 12, ramp);
     }
     case 15:
       slave_.acknowledge(now_ns_);
       if (slave_.has_error(emcy::heartbeat_lost) || slave_.has_error(emcy::rpdo_timeout)) {
-        // The cause persists: the connection must return first and restart the timers.
+        // The cause of the error persists: the connection must return first and restart the timers.
         return;
       }
       slave_.clear_error(fault_code_, now_ns_);
@@ -407,7 +415,7 @@ void DriveDevice::power_off() noexcept {
   axis_.disable();
 }
 
-// Keeps the state until the axis is at rest.
+// Begins a ramp. The drive keeps its state until the axis is at rest, then enters the state `after`.
 void DriveDevice::begin_stop(DriveState after, int transition, double deceleration_counts_per_s2) {
   stopping_ = true;
   after_stop_ = after;
@@ -438,7 +446,8 @@ RefusalReason DriveDevice::refusal() const noexcept {
 
 bool DriveDevice::energised() const noexcept { return powered_; }
 
-// 60C2h: value u8 · 10^(exponent i8) s. 0 if not set, or longer than 1 s.
+// Computes the period from 60C2h: value (u8) · 10^exponent (i8) s. The period is 0 if 60C2h isn't set or is longer than
+// 1 s.
 void DriveDevice::set_period() {
   const double period_s =
       static_cast<double>(period_value_->number()) * std::pow(10.0, static_cast<double>(period_index_->number()));
@@ -475,7 +484,7 @@ void DriveDevice::supervise_sync() {
   if (now_ns_ - last_sync_ns_ > tolerance * period_ns_) trip(emcy::sync_controller, error_register::communication);
 }
 
-// 8611h if the position is outside the window (6065h) for longer than 6066h.
+// Trips with 8611h if the following error exceeds the window (6065h) for longer than the time in 6066h.
 void DriveDevice::supervise_following_error() {
   if (!energised() || !brake_open()) return;
   const ObjectDictionary& od = slave_.dictionary();
@@ -496,7 +505,7 @@ void DriveDevice::on_communication_lost(std::uint16_t code, std::int64_t time_ns
   react_to_connection(slave_.dictionary().number(0x6007), code);
 }
 
-// 6007h: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop.
+// Reacts to a lost connection as 6007h says: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop.
 void DriveDevice::react_to_connection(std::int64_t option, std::uint16_t code) {
   if (latches() && code != emcy::communication) return trip(code, error_register::communication);
   if (state_ != DriveState::operation_enabled || stopping_) return;
@@ -511,7 +520,7 @@ void DriveDevice::on_nmt_state(NmtState from, NmtState to, std::int64_t time_ns)
   if (from == NmtState::initialising && state_ == DriveState::not_ready_to_switch_on) {
     enter(DriveState::switch_on_disabled, 1);
   }
-  // The drive was taken out of operational while moving: this counts as a lost connection.
+  // If the drive leaves NMT operational while it moves, this counts as a lost connection.
   if (from == NmtState::operational) react_to_connection(slave_.dictionary().number(0x6007), emcy::communication);
 }
 

@@ -1,16 +1,17 @@
-// A simulated CANopen servo drive with the CiA 402 profile: cyclic synchronous position (6060h = 8), interpolated
-// position (7), cyclic synchronous torque (10).
+// A simulated CANopen servo drive with the CiA 402 profile. Its modes are cyclic synchronous position (6060h = 8),
+// interpolated position (7) and cyclic synchronous torque (10).
 //
-// At each SYNC it latches the target (607Ah) received since the last one, samples position and statusword for its
-// transmit PDO, and reaches the target within the interpolation period (60C2h), at the next SYNC. On a SYNC without a
-// new target it decelerates within a limit (6085h) and never jumps; a torque (6071h, limited by 6072h) acts until the
-// next one. The drive stops by itself, also from a torque, when one of these fails:
-//   SYNC          2010h:01 interpolation periods without one     EMCY 8700h, fault reaction 605Eh
-//   receive PDO   its event timer, 1400h:05                      EMCY 8250h, reaction 6007h
-//   heartbeat     1016h                                          EMCY 8130h, reaction 6007h, then 1029h
+// At each SYNC the drive latches the target (607Ah) that it has received since the last SYNC, and samples position and
+// statusword for its transmit PDO. It reaches the target one interpolation period (60C2h) later, at the next SYNC. If
+// no new target has come, it decelerates within a limit (6085h) and never jumps. A torque (6071h, limited by 6072h)
+// acts until the next torque comes. The drive stops by itself, in torque mode too, when one of these fails:
+//   SYNC          missing for 2010h:01 interpolation periods     EMCY 8700h, fault reaction 605Eh
+//   receive PDO   missing for its event timer, 1400h:05          EMCY 8250h, reaction 6007h
+//   heartbeat     missing for the time in 1016h                  EMCY 8130h, reaction 6007h, then 1029h
 //
-// It refuses operation (stays switched on, statusword bit 7 set, reason in 2001h) while 6061h doesn't show the mode,
-// 60C2h isn't set or doesn't match the SYNCs, or the target isn't at the actual position.
+// The drive refuses operation while 6061h doesn't show the mode, while 60C2h isn't set or doesn't match the SYNCs, or
+// while the target isn't at the actual position. It then stays switched on, sets statusword bit 7, and gives the reason
+// in 2001h.
 #pragma once
 
 #include <array>
@@ -25,40 +26,41 @@
 
 namespace proxarm::sim {
 
-// For a drive with an incremental encoder: it counts from its position at power on, until it is homed (mode 6) at its
-// switch.
+// The incremental encoder of a drive. The encoder counts from its position at power on until the drive is homed (mode
+// 6) at its switch.
 struct IncrementalEncoder {
-  std::int32_t home_counts = 0;  // axis position at the switch
-  bool homed = false;            // before this power on
+  std::int32_t home_counts = 0;  // position of the axis at the switch
+  bool homed = false;            // true: the drive was homed before this power on
 };
 
 struct DriveDeviceConfig {
   CanopenSlaveConfig canopen;
-  std::uint32_t following_error_window_counts = 100'000;  // 6065h
+  std::uint32_t following_error_window_counts = 100'000;  // 6065h: window of the following error
   std::uint16_t following_error_time_ms = 10;             // 6066h
-  std::uint32_t quick_stop_deceleration = 1'000'000;      // 6085h, counts/s²
-  std::uint32_t profile_deceleration = 500'000;           // 6084h, counts/s²: slow-down ramp
-  std::uint32_t rated_torque_mNm = 1000;                  // 6076h, of the motor
-  std::int32_t position_min = 0, position_max = 0;        // 607Dh; equal: no limit
-  std::optional<IncrementalEncoder> incremental;          // nullopt: absolute encoder
-  std::int64_t brake_release_ns = 30'000'000;             // from enabling until it follows the target
+  std::uint32_t quick_stop_deceleration = 1'000'000;      // 6085h, in counts/s²
+  std::uint32_t profile_deceleration = 500'000;           // 6084h: deceleration of the slow-down ramp, in counts/s²
+  std::uint32_t rated_torque_mNm = 1000;                  // 6076h: rated torque of the motor
+  std::int32_t position_min = 0, position_max = 0;        // 607Dh; no limit if both are equal
+  std::optional<IncrementalEncoder> incremental;          // nullopt: the encoder is absolute
+  std::int64_t brake_release_ns = 30'000'000;             // time from enabling until the drive follows the target
   std::uint8_t sync_tolerance_periods = 3;                // 2010h:01; 0: SYNC isn't watched
-  // Objects that differ from the profile, as index << 8 | sub-index.
+  // Objects that the drive has in place of the profile's, as index << 8 | sub-index.
   description::DriveObjects objects{};
   std::uint32_t position_target = 0x607A00, interpolated_target = 0x60C101, torque_target = 0x607100;
-  std::optional<description::GearTorque> gear_torque{};  // how it reports its gear torque
-  const description::EdsFile* eds = nullptr;  // file of its dictionary (eds_objects.hpp); nullptr: default dictionary
+  std::optional<description::GearTorque> gear_torque{};  // how the drive reports its gear torque
+  // File of the drive's object dictionary (eds_objects.hpp); nullptr: default dictionary.
+  const description::EdsFile* eds = nullptr;
 };
 
-// Why operation was refused, 2001h.
+// The reason why operation was refused, 2001h.
 enum class RefusalReason : std::uint8_t {
   none = 0,
   mode_not_displayed = 1,
   interpolation_period_not_set = 2,
   no_sync = 3,
-  sync_period_mismatch = 4,    // average of eight SYNCs differs from 60C2h by more than 20 %
-  target_far_from_actual = 5,  // by more than the following-error window
-  not_operational = 6,         // NMT
+  sync_period_mismatch = 4,    // the mean interval of eight SYNCs differs from 60C2h by more than 20 %
+  target_far_from_actual = 5,  // the difference exceeds the following error window
+  not_operational = 6,         // the NMT state isn't operational
 };
 
 class DriveDevice final : public BusDevice, private CanopenApplication {
@@ -67,29 +69,31 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
 
   void power_on(std::int64_t time_ns) noexcept override;
   void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
-  // Precondition: the physics has been advanced to this time. Call at least once a millisecond.
+  // Must be called at least once a millisecond. Precondition: the physics has been advanced to time_ns.
   void on_time(std::int64_t time_ns) noexcept override;
 
   [[nodiscard]] DriveState state() const noexcept { return state_; }
   [[nodiscard]] std::uint16_t statusword() const noexcept;
-  [[nodiscard]] int last_transition() const noexcept { return last_transition_; }  // CiA 402 number
+  // The number of the transition in CiA 402.
+  [[nodiscard]] int last_transition() const noexcept { return last_transition_; }
   [[nodiscard]] CanopenSlave& canopen() noexcept { return slave_; }
   [[nodiscard]] const CanopenSlave& canopen() const noexcept { return slave_; }
 
-  // A fault of the drive, with its EMCY code: transition 13. Stays until it is reset.
+  // Makes the drive trip with this EMCY code (transition 13). The fault stays until it is reset.
   void inject_fault(std::uint16_t code, std::int64_t time_ns) noexcept;
-  // true: refuses to write 60C2h while operation is enabled (08000022h).
+  // true: the drive refuses to write 60C2h while operation is enabled (08000022h).
   void fix_period_while_enabled(bool fixed) noexcept { period_fixed_ = fixed; }
-  // Open: no power, and no command leaves "switch on disabled".
+  // true: STO is open; the motor has no power, and no command leaves "switch on disabled".
   void open_sto(bool open) noexcept;
-  // show_mode_late(): 6061h shows the mode only while operation is enabled. never_say_following(): statusword bit 12
-  // stays 0. show_mode(): 6061h shows `mode` instead of 6060h.
+  // true: 6061h shows the mode only while operation is enabled.
   void show_mode_late(bool late) noexcept { shows_mode_late_ = late; }
+  // true: statusword bit 12 stays 0.
   void never_say_following(bool on) noexcept { never_following_ = on; }
-  // Reports that it follows (bit 12) only while these bits of the controlword are set.
+  // Makes the drive report that it follows targets (bit 12) only while these bits of the controlword are set.
   void want_controlword_bits(std::uint16_t bits) noexcept { wanted_bits_ = bits; }
+  // Makes 6061h show `mode` instead of the value of 6060h; nullopt ends that.
   void show_mode(std::optional<std::int8_t> mode) noexcept { shown_mode_ = mode; }
-  // 60FDh, the inputs wired to it.
+  // Sets 60FDh, the digital inputs that are wired to the drive.
   void set_digital_inputs(std::uint32_t bits) noexcept { digital_inputs_->set(bits); }
 
  private:
@@ -127,7 +131,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void advance_homing();
   void power_on_encoder() noexcept;
   [[nodiscard]] bool homes() const noexcept;
-  // Relative to the drive's zero.
+  // position() and demand() are relative to the drive's zero.
   [[nodiscard]] std::int64_t position() const noexcept { return axis_.position_counts() - zero_counts_; }
   [[nodiscard]] std::int64_t demand() const noexcept { return axis_.demand_counts() - zero_counts_; }
   void supervise_sync();
@@ -142,13 +146,14 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   enum class HomingState : std::uint8_t { none, running, attained, failed };
   std::optional<IncrementalEncoder> incremental_;
   HomingState homing_ = HomingState::none;
-  double homing_counts_ = 0.0;             // axis position of the homing motion
-  std::int64_t homing_ns_ = 0;             // time of homing_counts_
-  std::int64_t zero_counts_ = 0;           // axis position of the drive's zero
-  std::array<ObjectEntry, 2> unlisted_{};  // replace 2001h and 2010h:01 in a drive with its maker's dictionary
-  std::int64_t period_ns_ = 0;             // 60C2h; 0: not set
+  double homing_counts_ = 0.0;    // position of the axis that the homing motion has reached
+  std::int64_t homing_ns_ = 0;    // time of homing_counts_
+  std::int64_t zero_counts_ = 0;  // position of the axis at the drive's zero
+  // Stand-ins for 2001h and 2010h:01 in a drive with its maker's dictionary.
+  std::array<ObjectEntry, 2> unlisted_{};
+  std::int64_t period_ns_ = 0;  // period in 60C2h; 0: 60C2h isn't set
 
-  // Entries used in every cycle.
+  // Dictionary entries that are used in every cycle.
   ObjectEntry *controlword_ = nullptr, *statusword_ = nullptr, *target_ = nullptr, *position_ = nullptr,
               *demand_ = nullptr, *velocity_ = nullptr, *following_error_ = nullptr, *torque_ = nullptr,
               *mode_ = nullptr, *mode_display_ = nullptr, *error_code_ = nullptr, *refusal_ = nullptr,
@@ -166,14 +171,14 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   std::optional<std::int8_t> shown_mode_;
   std::uint16_t wanted_bits_ = 0;
   std::int64_t brake_open_ns_ = 0;
-  bool stopping_ = false;  // on a ramp that ends in after_stop_
+  bool stopping_ = false;  // the axis is on a ramp, after which the drive enters after_stop_
   DriveState after_stop_ = DriveState::switch_on_disabled;
   int after_stop_transition_ = 0;
-  std::uint16_t fault_code_ = 0;  // latched fault; 0: none
-  bool target_taken_ = false;     // since power on
+  std::uint16_t fault_code_ = 0;  // code of the latched fault; 0: no fault
+  bool target_taken_ = false;     // a target was taken since the power stage was last switched on
   bool target_fresh_ = false;     // 607Ah was written since the last SYNC
-  bool following_ = false;        // bit 12
-  bool target_limited_ = false;   // by 607Dh or 6072h
+  bool following_ = false;        // bit 12 of the statusword
+  bool target_limited_ = false;   // 607Dh or 6072h limits the target
   std::int64_t following_error_since_ns_ = never;
   std::int64_t last_sync_ns_ = never;
   std::int64_t intervals_ns_[intervals] = {};

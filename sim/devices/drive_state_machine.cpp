@@ -17,7 +17,7 @@ using enum DriveCommand;
 constexpr Row transitions[] = {
     {2, switch_on_disabled, shutdown, ready_to_switch_on},
     {3, ready_to_switch_on, switch_on, DriveState::switched_on},
-    {3, ready_to_switch_on, enable_operation, DriveState::switched_on},  // then 4
+    {3, ready_to_switch_on, enable_operation, DriveState::switched_on},  // transition 4 follows
     {4, DriveState::switched_on, enable_operation, operation_enabled},
     {5, operation_enabled, switch_on, DriveState::switched_on},
     {6, DriveState::switched_on, shutdown, ready_to_switch_on},

@@ -9,8 +9,8 @@ namespace {
 using description::EdsFile;
 using description::EdsObject;
 
-// Objects whose values aren't taken from the file: identity (the caller takes it from [DeviceInfo]), errors, measured
-// values, and properties of the axis.
+// Objects whose values aren't taken from the file: the identity (the caller takes it from [DeviceInfo]), errors,
+// measured values, and properties of the axis.
 constexpr std::uint16_t own_values[] = {0x1000, 0x1001, 0x1003, 0x1018, 0x603F, 0x6041, 0x6061, 0x6062,
                                         0x6064, 0x606C, 0x6076, 0x6077, 0x607D, 0x60F4, 0x60FD};
 constexpr std::uint16_t supported_modes = 0x6502;
@@ -25,7 +25,7 @@ Access access_of(const EdsObject& object) noexcept {
   return object.readable ? Access::read_write : Access::write_only;
 }
 
-// Changes the length and keeps the number.
+// Changes the entry's type and length; the number that it holds stays the same.
 void change_type(ObjectEntry& entry, DataType type) {
   if (type == entry.type || size_of(type) == 0 || size_of(entry.type) == 0) return;
   const std::int64_t number = entry.number();

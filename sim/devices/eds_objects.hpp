@@ -1,11 +1,12 @@
 // Gives a simulated drive the object dictionary of its maker's EDS or DCF file.
 //
-// The file then determines objects, data types, access, mapping, default values and limits. The simulation's use of an
-// object doesn't change. Objects unknown to the simulation are only stored. Objects that it needs but the file lacks
-// are hidden and keep the simulation's default, as in a firmware that doesn't show them.
+// The file then determines which objects exist, their data types, access types, mapping, default values and limits. The
+// simulation uses an object in the same way as without a file. Objects that the simulation doesn't know are only
+// stored. Objects that the simulation needs but the file lacks are hidden and keep the simulation's default, as in a
+// firmware that doesn't show them.
 //
-// Not taken from the file: values set at installation or measured. These are position limits (607Dh), rated torque
-// (6076h), and values that change by themselves, such as the statusword.
+// These values aren't taken from the file, because they are set at installation or measured: position limits (607Dh),
+// rated torque (6076h), and values that change by themselves, such as the statusword.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,7 @@
 
 namespace proxarm::sim {
 
-// Call before the first power on. `node` replaces $NODEID.
+// Applies the file to the dictionary. `node` replaces $NODEID. Must be called before the first power on.
 void take_over(const description::EdsFile& eds, std::uint8_t node, ObjectDictionary& dictionary);
 
 }  // namespace proxarm::sim

@@ -25,7 +25,7 @@ PressedSpan parse_pressed_span(std::string_view text) {
     if (part == "0" || part == "0s") return 0;
     return std::llround(1e9 * description::parse_duration(part, "--enabling"));
   };
-  // A single time could be a start, an end or a duration.
+  // A single time is refused, because it could be a start, an end or a duration.
   if (dots == std::string_view::npos || dots == 0) {
     throw description::SetupError({.key = "--enabling",
                                    .found = description::in_quotes(text),

@@ -1,7 +1,7 @@
-// The simulated person's enabling switch: the times at which it is pressed, and its message if it has one.
+// The simulated person's enabling switch: the times at which it is pressed, and its message if it sends one.
 //
-// Times count from the first SYNC on the cell's buses (from power on if no drive is on CAN). A second without SYNC ends
-// a session; the next one starts the times again. Before the first span the switch is released.
+// Times count from the first SYNC on the cell's buses, or from power on if no drive is on CAN. A second without SYNC
+// ends a session; in the next session the times begin again. Before the first span the switch is released.
 #pragma once
 
 #include <cstdint>
@@ -13,27 +13,29 @@
 
 namespace proxarm::sim {
 
-// During a span, a switch with two positions is pressed; one with three is in its middle position, or squeezed.
+// A time span in which the switch is pressed. A switch with three positions is then in its middle position, or in its
+// third position if `squeezed`.
 struct PressedSpan {
   std::int64_t from_ns = 0;
   std::int64_t until_ns = INT64_MAX;
   bool squeezed = false;
 };
 
-// "0.5s..3s", "2s.." or "2s"; "squeezed:2s..3s". Throws SetupError that names the option.
+// Parses "0.5s..3s", "2s.." or "squeezed:2s..3s". Throws SetupError that names the option.
 [[nodiscard]] PressedSpan parse_pressed_span(std::string_view text);
 
 class EnablingSwitch final : public BusDevice {
  public:
-  // `port` carries its message; null: wired to a drive. Without spans, pressed from 0.1 s on.
+  // `port` carries the switch's message; nullptr: the switch is wired to a drive. If each of the `spans` is squeezed,
+  // or if there is no span, the switch is also pressed from 0.1 s on.
   EnablingSwitch(const description::EnablingInputDescription& input, std::vector<PressedSpan> spans, DevicePort* port);
 
   void on_sync(std::int64_t time_ns) noexcept;
-  // For cells without SYNC.
+  // Starts the times in a cell without SYNC.
   void begin_without_sync(std::int64_t time_ns) noexcept;
   [[nodiscard]] bool pressed() const noexcept { return pressed_; }
   [[nodiscard]] bool squeezed() const noexcept { return squeezed_; }
-  // Its bits in the drive's object; other bits are 0.
+  // Returns the switch's bits in the drive's object; other bits are 0.
   [[nodiscard]] std::uint32_t digital_inputs() const noexcept;
 
   void power_on(std::int64_t time_ns) noexcept override;
@@ -42,7 +44,7 @@ class EnablingSwitch final : public BusDevice {
 
  private:
   void send(std::int64_t time_ns) noexcept;
-  // Each contact at its bit, counted from bit 0 of byte 0 of the message or object.
+  // Returns the state of each contact at the contact's bit. Bits count from bit 0 of byte 0 of the message or object.
   [[nodiscard]] std::uint64_t contacts() const noexcept;
 
   description::EnablingInputDescription input_;

@@ -92,7 +92,7 @@ std::vector<std::uint8_t> ModbusDevice::answer_to(std::span<const std::uint8_t> 
     if (count < 1 || count > 125) return exception(request, illegal_value);
     return read_into(answer, at, count) ? answer : exception(request, illegal_address);
   }
-  // The written part; function 23 has it after the read part.
+  // The rest of the request is the written part, which function 23 has after the read part.
   const std::size_t first = function == 16 ? 2 : 6;
   if (request.size() < first + 5) return exception(request, illegal_value);
   const unsigned write_at = word(request, first), write_count = word(request, first + 2);
@@ -132,7 +132,8 @@ bool ModbusDevice::store(unsigned at, unsigned count, std::span<const std::uint8
   return true;
 }
 
-// A command takes effect when its last register is written, where a trigger is.
+// Notes a command when the last register of the command is written. If a drive starts a motion only by a trigger, its
+// trigger is in that register.
 void ModbusDevice::note_command(unsigned at, unsigned count) noexcept {
   const unsigned last = registers_.command_register + static_cast<unsigned>(registers_.command_count()) - 1;
   if (at <= last && at + count > last) commanded_ = true;

@@ -1,9 +1,10 @@
-// A simulated drive on a Modbus line: holding registers as in its description, and an axis that moves to the last
-// command's position at its speed.
+// A simulated drive on a Modbus line. It has the holding registers of its description, and an axis that moves to the
+// position of the last command at the speed of that command.
 //
-// A server's thread may call serve() at any time; the physics' thread calls on_time() at least once a millisecond. The
-// axis is driven while the control word requests it; without a control word, always. If no request comes for the
-// setting "communication timeout" (ms; 0: not watched), the drive stops until it is switched off and on again.
+// A server's thread may call serve() at any time. The thread of the physics calls on_time() at least once a
+// millisecond. The axis is driven while the control word requests it; a drive without a control word is always driven.
+// The setting "communication timeout" (ms; 0: not watched) says how long a request may be missing; after that the drive
+// stops until it is switched off and on again.
 #pragma once
 
 #include <cstdint>
@@ -21,25 +22,25 @@ namespace proxarm::sim {
 // Exception codes of a Modbus server.
 inline constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal_value = 3;
 
-// Faults of its answers; VALUE as in device_fault.hpp.
+// Faults of the drive's answers. VALUE is that of device_fault.hpp.
 enum class ModbusFault : std::uint8_t {
   none,
   exception,
   silent,
   lost,  // one of VALUE requests gets no answer
-  late,  // the answer is VALUE ms late; only on a real line
+  late,  // the answer comes VALUE ms late; only on a real line
   closed,
-  wrong_unit,      // the next unit's number
-  wrong_function,  // another function code
-  wrong_count,     // announces one register less
-  half,            // cut in half
-  low_word_first,  // words in the opposite order of the file
-  forgets,         // acknowledges settings without storing them
-  no_function_23,  // answers function 23 with exception 01
-  not_ready,       // status never shows ready or driven
-  not_driven,      // status never shows driven
-  tripped,         // status shows a fault
-  echo,            // RTU: its adapter echoes each request before the answer
+  wrong_unit,      // the answer has the number of the next unit
+  wrong_function,  // the answer has another function code
+  wrong_count,     // the answer announces one register less
+  half,            // the answer is cut in half
+  low_word_first,  // the words are in the opposite order of the file's
+  forgets,         // the drive acknowledges settings without storing them
+  no_function_23,  // function 23 is answered by exception 01
+  not_ready,       // the status never shows ready or driven
+  not_driven,      // the status never shows driven
+  tripped,         // the status shows a fault
+  echo,            // RTU: the adapter echoes each request before the answer
 };
 
 // A device that answers on a Modbus line.
@@ -51,7 +52,7 @@ class ModbusUnit {
   virtual ~ModbusUnit() = default;
 
   [[nodiscard]] virtual std::uint8_t unit() const noexcept = 0;
-  // Takes unit and PDU of a request to this unit; returns those of the answer, or nothing for no answer.
+  // Takes a request to this unit (unit and PDU). Returns the answer (unit and PDU); empty: the device doesn't answer.
   [[nodiscard]] virtual std::vector<std::uint8_t> serve(std::span<const std::uint8_t> request) = 0;
   [[nodiscard]] virtual ModbusFault fault() const noexcept = 0;
   [[nodiscard]] virtual int late_ms() const noexcept { return 0; }
@@ -63,7 +64,7 @@ class ModbusDevice final : public ModbusUnit {
                double deceleration_counts_per_s2, ServoAxis& axis);
 
   [[nodiscard]] std::uint8_t unit() const noexcept override { return unit_; }
-  // Functions 3, 16 and 23, else exception 01.
+  // Supports functions 3, 16 and 23. Other functions are answered by exception 01.
   [[nodiscard]] std::vector<std::uint8_t> serve(std::span<const std::uint8_t> request) override;
   void on_time(std::int64_t time_ns) noexcept;
 
@@ -93,7 +94,7 @@ class ModbusDevice final : public ModbusUnit {
   double deceleration_;
   ServoAxis& axis_;
   mutable std::mutex mutex_;
-  std::unordered_map<unsigned, std::uint16_t> bank_;  // the existing registers
+  std::unordered_map<unsigned, std::uint16_t> bank_;  // the registers that exist
   ModbusFault fault_ = ModbusFault::none;
   std::uint32_t fault_value_ = 0, requests_ = 0;
   bool commanded_ = false, requested_ = false, enabled_ = false, timed_out_ = false;

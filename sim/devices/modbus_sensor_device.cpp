@@ -14,7 +14,7 @@ void ModbusSensorDevice::set_silent(bool silent) noexcept {
   silent_ = silent;
 }
 
-// Function 3: unit, 03, first register, number of registers.
+// Serves function 3: unit, 03, first register, number of registers.
 std::vector<std::uint8_t> ModbusSensorDevice::serve(std::span<const std::uint8_t> request) {
   const std::lock_guard lock(mutex_);
   if (silent_ || request.size() < 2) return {};

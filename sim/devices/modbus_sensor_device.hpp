@@ -1,6 +1,6 @@
 // A simulated force sensor on a Modbus line: offers the samples of a DescribedDevice as holding registers.
 //
-// The physics' thread calls send() with a sample; a server's thread may call serve() at any time. A silent sensor
+// The thread of the physics calls send() with a sample. A server's thread may call serve() at any time. A silent sensor
 // doesn't answer.
 #pragma once
 

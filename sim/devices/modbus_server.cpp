@@ -23,8 +23,9 @@ namespace {
 using description::ModbusLineDescription;
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr int look_up_ms = 20;         // how often the threads check whether to end
-constexpr std::size_t mbap_bytes = 6;  // transaction, protocol, length; unit and PDU follow
+constexpr int look_up_ms = 20;  // how often the threads check whether they must end
+// Length of the header (transaction, protocol, length); unit and PDU follow.
+constexpr std::size_t mbap_bytes = 6;
 
 description::SetupError problem(const ModbusLineDescription& line, const std::string& what) {
   return description::SetupError({.bus = line.name, .message = what, .found = std::strerror(errno)});
@@ -35,14 +36,14 @@ bool readable(int fd) noexcept {
   return poll(&waiting, 1, look_up_ms) > 0;
 }
 
-// CRC-16/MODBUS: x¹⁶ + x¹⁵ + x² + 1, reflected, from FFFFh; sent low byte first.
+// Returns the CRC-16/MODBUS: x¹⁶ + x¹⁵ + x² + 1, reflected, start value FFFFh. It is sent low byte first.
 std::uint16_t crc16(const Bytes& bytes) noexcept {
   boost::crc_optimal<16, 0x8005, 0xFFFF, 0, true, true> crc;
   crc.process_bytes(bytes.data(), bytes.size());
   return crc.checksum();
 }
 
-// Bytes of a serial request with its checksum; 0 if not yet known.
+// Returns the number of bytes of a serial request with its checksum; 0 if the bytes received so far don't tell it yet.
 std::size_t rtu_request_size(const Bytes& bytes) noexcept {
   if (bytes.size() < 2) return 0;
   if (bytes[1] == 16) return bytes.size() < 7 ? 0 : 9U + bytes[6];
@@ -105,7 +106,7 @@ void ModbusServer::serve_tcp() noexcept {
   }
 }
 
-// Serves one request; false at the end of the connection.
+// Serves one request. False at the end of the connection.
 bool ModbusServer::serve_connection(int connection) noexcept {
   if (!readable(connection)) {
     for (const ModbusUnit* device : devices_) {
@@ -126,7 +127,7 @@ bool ModbusServer::serve_connection(int connection) noexcept {
     if (answer.empty()) return true;
     usleep(1000U * static_cast<unsigned>(device->late_ms()));
     Bytes reply(header.begin(), header.end());
-    // Half an answer announces its full length.
+    // An answer that is cut in half announces its full length.
     const std::size_t announced = device->fault() == ModbusFault::half ? 2 * answer.size() : answer.size();
     reply[4] = static_cast<std::uint8_t>(announced >> 8);
     reply[5] = static_cast<std::uint8_t>(announced);
@@ -163,14 +164,14 @@ void ModbusServer::open_terminal(const ModbusLineDescription& line) {
 void ModbusServer::serve_terminal() noexcept {
   Bytes received;
   while (!stop_.load()) {
-    // A pause ends an incomplete request; the following bytes begin another one.
+    // A pause ends an incomplete request. The bytes after the pause begin another request.
     if (!readable(terminal_fd_)) {
       received.clear();
       continue;
     }
     std::array<std::uint8_t, 256> chunk{};
     const ssize_t count = read(terminal_fd_, chunk.data(), chunk.size());
-    if (count <= 0) {  // the other end isn't open
+    if (count <= 0) {  // the master's end isn't open
       usleep(1000 * look_up_ms);
       continue;
     }
@@ -179,7 +180,7 @@ void ModbusServer::serve_terminal() noexcept {
     if (size == 0 || received.size() < size) continue;
     Bytes request(received.begin(), received.begin() + static_cast<std::ptrdiff_t>(size));
     received.clear();
-    if (crc16(request) != 0) continue;  // 0 over a message with its checksum
+    if (crc16(request) != 0) continue;  // the CRC over a message with its checksum must be 0
     for (ModbusUnit* device : devices_) {
       if (device->unit() != request[0]) continue;
       if (device->fault() == ModbusFault::echo && write(terminal_fd_, request.data(), size) < 0) break;

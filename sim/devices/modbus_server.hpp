@@ -1,5 +1,5 @@
 // Serves simulated Modbus devices on a real line: a TCP port of the loopback interface, or a pseudo-terminal for RTU.
-// libmodbus does framing, checksums and waiting; one thread serves one master.
+// One thread serves one master.
 #pragma once
 
 #include <atomic>
@@ -14,16 +14,18 @@ namespace proxarm::sim {
 
 class ModbusServer {
  public:
-  // Opens the line and serves it until destruction. `line.host` must be a loopback address (port 0: any free port). For
-  // a serial line, creates a pseudo-terminal and, if `line.device` isn't empty, makes that a symbolic link to it.
-  // Throws SetupError. The devices must outlive the server.
+  // Opens the line and serves it until destruction. For TCP, `line.host` must be a loopback address; port 0 means any
+  // free port. For a serial line, creates a pseudo-terminal; if `line.device` isn't empty, it becomes a symbolic link
+  // to the pseudo-terminal. Throws SetupError. The devices must outlive the server.
   ModbusServer(const description::ModbusLineDescription& line, std::vector<ModbusUnit*> devices);
   ModbusServer(const ModbusServer&) = delete;
   ModbusServer& operator=(const ModbusServer&) = delete;
   ~ModbusServer();
 
-  [[nodiscard]] int port() const noexcept { return port_; }                       // TCP
-  [[nodiscard]] const std::string& device() const noexcept { return terminal_; }  // RTU: the master's end, /dev/pts/N
+  // The port of a TCP line.
+  [[nodiscard]] int port() const noexcept { return port_; }
+  // The master's end of an RTU line, /dev/pts/N.
+  [[nodiscard]] const std::string& device() const noexcept { return terminal_; }
 
  private:
   void open_tcp(const description::ModbusLineDescription& line);

@@ -21,14 +21,17 @@ using models::Vec3;
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using MujocoJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, models::most_rows>;
 
-// Mechanical end stops are this far beyond the URDF's limits, so that software limits act first: 3 degrees.
+// Mechanical end stops are this far beyond the URDF's limits (3 degrees), so that software limits act before them.
 constexpr double end_stop_margin_rad = 0.05;
-// A gear given as rigid (stiffness 0) is as stiff as the step allows: 200 Hz with its link's inertia.
+// A gear with stiffness 0 in the cell counts as rigid. It gets the stiffness that gives this natural frequency (200 Hz)
+// with the inertia of its link, which is about the stiffest that the step allows.
 constexpr double rigid_gear_rad_per_s = 2.0 * M_PI * 200.0;
-// Symplectic Euler is unstable from ωh = 2 on; damping and rotors lower that a little.
+// Limit for ω·h, the phase by which a mode ω advances in a step h. Symplectic Euler is unstable from ωh = 2 on; damping
+// and rotors lower that limit a little.
 constexpr double largest_phase_step = 1.5;
 
-// For step_share() at the start: while the arm moves, the masses at its tip change by less than a third.
+// Limit for step_share() at the start. The margin is enough because the masses at the arm's tip change by less than a
+// third while the arm moves.
 constexpr double largest_step_share = 0.75;
 
 Mat3 inertia_matrix(const std::array<double, 6>& i) {
@@ -42,13 +45,13 @@ Mat3 inertia_matrix(const std::array<double, 6>& i) {
 struct ArmDynamics::Links {
   ModelPointer model;
   DataPointer data;
-  int body = 0;     // sensor's link
-  Pose X_LS, X_LT;  // L: sensor's link
+  int body = 0;     // index of the sensor's link L
+  Pose X_LS, X_LT;  // L is the sensor's link
   RowMat3 R_BL = RowMat3::Identity();
   Vec3 p_BL = Vec3::Zero();
-  Vec3 arm_B = Vec3::Zero();                   // from L's origin to T's, in B
-  std::vector<double> lower_stop, upper_stop;  // per axis
-  MujocoJacobian jacobian;                     // 3 × nv, scratch
+  Vec3 arm_B = Vec3::Zero();                   // from the origin of L to the origin of T, in B
+  std::vector<double> lower_stop, upper_stop;  // one per axis
+  MujocoJacobian jacobian;                     // 3 × nv; scratch memory
 };
 
 ArmDynamics::~ArmDynamics() = default;
@@ -123,7 +126,8 @@ void ArmDynamics::reset(std::span<const double> joint_rad) {
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     Axis& axis = axes_[i];
     if (!(axis.stiffness_Nm_per_rad > 0.0)) {
-      const double inertia = l.data->qM[l.model->dof_Madr[axis.dof]];  // the diagonal of M comes first in its row
+      // The diagonal element of M comes first in its row.
+      const double inertia = l.data->qM[l.model->dof_Madr[axis.dof]];
       axis.stiffness_Nm_per_rad = inertia * rigid_gear_rad_per_s * rigid_gear_rad_per_s;
       axis.damping_Nms_per_rad = 0.1 * inertia * rigid_gear_rad_per_s;
     }
@@ -160,8 +164,8 @@ void ArmDynamics::reset(std::span<const double> joint_rad) {
   apply(torque, Vec3::Zero());
 }
 
-// Symplectic Euler: v(t+h) = v(t) + h a(t), then q(t+h) = q(t) + h v(t+h). The rotor follows (b), with its friction at
-// t+h: it stops within the step, and stays stopped, if friction suffices.
+// Advances the state by symplectic Euler: v(t+h) = v(t) + h a(t), then q(t+h) = q(t) + h v(t+h). The rotor follows (b),
+// with the friction at time t+h: the rotor stops within the step, and stays stopped, if the friction suffices.
 void ArmDynamics::advance() noexcept {
   mjData& d = *links_->data;
   const double h = step_s_;
@@ -197,7 +201,8 @@ void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& han
   update_accelerations();
 }
 
-// (d), for one step of δ: with s its sign, z approaches s z_m by the factor exp(−|step|/w).
+// Advances the gear's friction z by (d) for one step of δ: z approaches s z_m (s is the sign of the step) by the factor
+// exp(−|step|/w).
 void ArmDynamics::rub(Axis& axis) noexcept {
   const double windup = axis.angle_rad - links_->data->qpos[axis.dof], step = windup - axis.windup_rad;
   axis.windup_rad = windup;
@@ -205,7 +210,7 @@ void ArmDynamics::rub(Axis& axis) noexcept {
   axis.gear_friction_Nm = end + (axis.gear_friction_Nm - end) * std::exp(-std::abs(step) / axis.hysteresis_rad);
 }
 
-// (c): each flank can only push.
+// Returns the gear torque by (c). Each flank of the gear can only push.
 double ArmDynamics::gear_torque(const Axis& axis) const noexcept {
   const mjData& d = *links_->data;
   const double windup = axis.angle_rad - d.qpos[axis.dof];
@@ -231,7 +236,7 @@ void ArmDynamics::update_kinematics() noexcept {
   l.R_BL = Eigen::Map<const RowMat3>(d->xmat + 9 * l.body);
   l.p_BL = Eigen::Map<const Vec3>(d->xpos + 3 * l.body);
   l.arm_B = l.R_BL * l.X_LT.translation();
-  std::array<double, 6> twist{};  // angular part first
+  std::array<double, 6> twist{};  // the angular part comes first
   mj_objectVelocity(m, d, mjOBJ_XBODY, l.body, twist.data(), 0);
   const Vec3 omega_B(twist.data()), v_B(twist.data() + 3);
   const Mat3 R_WB = X_WB_.linear();
@@ -241,7 +246,8 @@ void ArmDynamics::update_kinematics() noexcept {
   tool_.angular_velocity_W = R_WB * omega_B;
 }
 
-// (a). The person carries the hand's weight, so MuJoCo's gravity on the hand is compensated.
+// Computes the accelerations by (a). The person carries the hand's weight, so MuJoCo's gravity on the hand is
+// compensated.
 void ArmDynamics::update_accelerations() noexcept {
   Links& l = *links_;
   const mjModel* m = l.model.get();
@@ -263,14 +269,15 @@ void ArmDynamics::update_accelerations() noexcept {
   update_tool_acceleration();
 }
 
-// The sensor's load, about S's origin. Handle (mass m, centre of mass C) and hand (m_h at T) follow the arm, so their
-// load is the force that acts on them less the force that accelerates them:
+// Computes the tool's acceleration and the sensor's load about the origin of S. Handle (mass m, centre of mass C) and
+// hand (mass m_h at T) follow the arm. So their load on the sensor is the force that acts on them minus the force that
+// accelerates them:
 //   F = F_hand − m_h a_T + m (g − a_C)
 //   τ = r_T × (F_hand − m_h a_T) + (τ_hand − I_h α) + r_C × m (g − a_C) − (I α + ω × I ω)
 void ArmDynamics::update_tool_acceleration() noexcept {
   const Links& l = *links_;
   mj_rnePostConstraint(l.model.get(), l.data.get());
-  std::array<double, 6> a{};  // angular part first; of L's origin, less gravity
+  std::array<double, 6> a{};  // acceleration of L's origin, minus gravity; the angular part comes first
   mj_objectAcceleration(l.model.get(), l.data.get(), mjOBJ_XBODY, l.body, a.data(), 0);
   const Mat3 R_WB = X_WB_.linear();
   const Vec3 alpha_W = R_WB * Vec3(a.data());
@@ -303,8 +310,8 @@ double ArmDynamics::joint_speed_rad_per_s(std::size_t axis) const noexcept {
   return links_->data->qvel[axes_[axis].dof];
 }
 
-// −∂/∂φ of the work of gravity: Σ over bodies behind the joint of (axis × lever) · (−m g); for a prismatic joint, axis
-// · (−m g).
+// Returns −∂/∂φ of the work of gravity: Σ (axis × lever) · (−m g) over the bodies behind the joint; for a prismatic
+// joint, Σ axis · (−m g).
 double ArmDynamics::static_torque_Nm(std::size_t axis) const noexcept {
   const mjModel* m = links_->model.get();
   const mjData* d = links_->data.get();
@@ -364,13 +371,14 @@ double ArmDynamics::step_share() const {
   const Eigen::Index n = m->nv;
   models::SmallMatrix links(n, n);
   mj_fullM(m, links.data(), links_->data->qM);
-  // Links first, then rotors; each gear connects one link and one rotor.
+  // Links come first, then rotors. Each gear connects one link and one rotor.
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(2 * n, 2 * n), F = M;
   M.topLeftCorner(n, n) = links;
   for (const Axis& axis : axes_) {
     const Eigen::Index link = axis.dof, rotor = n + axis.dof;
     M(rotor, rotor) = axis.rotor_inertia_kg_m2;
-    // When its motion reverses, a gear with hysteresis is twice as stiff: k plus k/2 (1 + 1) by (d).
+    // When the motion of a gear with hysteresis reverses, the gear is twice as stiff: dz/dδ in (d) is then k/2 (1 + 1)
+    // = k, in addition to the spring's k.
     const double stiffest = (axis.hysteresis_rad > 0.0 ? 2.0 : 1.0) * axis.stiffness_Nm_per_rad;
     const double gear = step_s_ * step_s_ * stiffest + 2.0 * step_s_ * axis.damping_Nms_per_rad;
     F(link, link) += gear;

@@ -51,7 +51,8 @@ void remove_children(tinyxml2::XMLElement& parent, const char* name) {
   while (auto* child = parent.FirstChildElement(name)) parent.DeleteChild(child);
 }
 
-// MuJoCo silently ignores <mimic>. Its shapes aren't needed, and meshes would only be further files to miss.
+// Throws SetupError for <mimic>, which MuJoCo would silently ignore. Removes shapes from the URDF: they aren't needed,
+// and their meshes would only be more files that can be missing.
 void refuse_and_strip(const Cell& cell, tinyxml2::XMLElement& robot) {
   for (auto* joint = robot.FirstChildElement("joint"); joint; joint = joint->NextSiblingElement("joint")) {
     if (const auto* mimic = joint->FirstChildElement("mimic")) {
@@ -99,7 +100,8 @@ void add_payload(tinyxml2::XMLElement& robot, const Payload& payload) {
   origin->SetAttribute("rpy", numbers(payload.pose.rpy_rad.data(), 3).c_str());
 }
 
-// MuJoCo needs an inertia above zero: 0.4 m r² of a ball of 1 mm, 1e-5 of the smallest inertia of a wrist.
+// Returns the inertia of a point mass: at least 0.4 m r² of a ball with a radius of 1 mm, because MuJoCo needs an
+// inertia above zero. That is 1e-5 of the smallest inertia of a wrist.
 std::array<double, 6> point_inertia(double mass_kg, double inertia_kg_m2 = 0.0) {
   const double i = std::max(inertia_kg_m2, 0.4e-6 * mass_kg);
   return {i, i, i, 0.0, 0.0, 0.0};
@@ -157,7 +159,8 @@ ModelPointer load_links(const Cell& cell, double hand_mass_kg, double hand_inert
   refuse_and_strip(cell, *robot);
   require_link(cell, *robot);
   add_payloads(cell, hand_mass_kg, hand_inertia_kg_m2, *robot);
-  // Without fusestatic="false", MuJoCo merges links behind fixed joints, and the flange with them.
+  // Without fusestatic="false", MuJoCo would merge the links behind fixed joints with their parents, and the flange
+  // among them.
   auto* compiler = document.NewElement("mujoco");
   compiler->InsertNewChildElement("compiler")->SetAttribute("fusestatic", "false");
   robot->InsertFirstChild(compiler);

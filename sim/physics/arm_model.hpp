@@ -16,8 +16,9 @@ struct MujocoDelete {
 using ModelPointer = std::unique_ptr<mjModel, MujocoDelete>;
 using DataPointer = std::unique_ptr<mjData, MujocoDelete>;
 
-// The links of the URDF, with the handle and the hand's point mass fixed to the sensor's link, in the base frame
-// (gravity turned into it). Without shapes, as nothing collides here. Throws description::SetupError.
+// Returns the links of the URDF in the base frame, with the handle and the hand's point mass fixed to the sensor's
+// link. The gravity vector is given in the base frame. The model has no shapes, because nothing collides here. Throws
+// description::SetupError.
 ModelPointer load_links(const description::Cell& cell, double hand_mass_kg, double hand_inertia_kg_m2 = 0.0);
 
 }  // namespace proxarm::sim

@@ -1,7 +1,9 @@
-// A body clamped between the tool and a rigid obstacle, modelled as a spring that only pushes:
+// A body clamped between the tool and a rigid obstacle, modelled as a spring that can only push:
 //
-//   F = −k max(0, (p − p₀)·n) n   on the tool at T (p), with n into the body
-// Without damping, friction or mass: it stores all the energy put into it, k x²/2.
+//   F = −k max(0, (p − p₀)·n) n
+//
+// F acts on the tool at T, p is the position of T, and n points into the body. The spring has no damping, friction or
+// mass: it stores all the energy put into it, k x²/2.
 #pragma once
 
 #include <algorithm>
@@ -11,10 +13,12 @@
 namespace proxarm::sim {
 
 struct Clamp {
-  models::Vec3 surface_W = models::Vec3::Zero();  // p₀, point of first contact
-  models::Vec3 normal_W = models::Vec3::UnitX();  // n, unit vector
+  models::Vec3 surface_W = models::Vec3::Zero();  // p₀, the point of first contact
+  models::Vec3 normal_W = models::Vec3::UnitX();  // n, a unit vector
   double stiffness_N_per_m = 0.0;
-  bool felt = true;  // it presses on the handle, so the sensor measures it; false: on the arm before the sensor
+  // true: the body presses on the handle, so the sensor measures the force; false: it presses on the arm before the
+  // sensor.
+  bool felt = true;
 
   [[nodiscard]] double depth_m(const models::Vec3& tool_W) const noexcept {
     return std::max(0.0, (tool_W - surface_W).dot(normal_W));

@@ -69,6 +69,7 @@ double ForceSensorModel::decay(std::int64_t elapsed_ns) const noexcept {
   return time_constant_s_ > 0.0 ? std::exp(-1e-9 * static_cast<double>(elapsed_ns) / time_constant_s_) : 0.0;
 }
 
+// Returns the output of the low-pass at time t, with input w, start value y(t₀) and time constant τ:
 //   y(t) = w + (y(t₀) − w) e^(−(t − t₀)/τ)
 Vec6 ForceSensorModel::filtered(const Piece& piece, std::int64_t time_ns) const noexcept {
   return piece.input + decay(std::max<std::int64_t>(0, time_ns - piece.start_ns)) * (piece.start - piece.input);

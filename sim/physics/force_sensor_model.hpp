@@ -1,9 +1,12 @@
-// The inside of a simulated force sensor: turns the true wrench into strain gauge counts, at the converter's rate.
+// The measuring part of a simulated force sensor: converts the true wrench into strain gauge counts, at the converter's
+// rate.
 //
-//   low-pass of order 1 → at the converter's next sample time: + noise → gauges = matrix⁻¹ · (counts per unit · wrench)
-//   + bias → rounded, saturated to int16
-// The converter runs freely (sample times k/rate, rounded down to ns, from time zero); a reader gets the latest
-// finished sample. Noise depends only on seed and sample number, not on the time of reading.
+//   wrench → low-pass of order 1 → at the converter's next sample time: + noise
+//   gauges = matrix⁻¹ · (counts per unit · wrench) + bias, rounded and saturated to int16
+//
+// The converter runs independently of its readers. Its sample times are k/rate from time zero on, rounded down to ns. A
+// reader gets the latest finished sample. Noise depends only on the seed and the number of the sample, not on the time
+// of reading.
 #pragma once
 
 #include <array>
@@ -17,16 +20,16 @@ namespace proxarm::sim {
 
 struct GaugeSample {
   std::array<std::int16_t, 6> gauges{};
-  bool saturated = false;    // some gauge is at the end of its range
+  bool saturated = false;    // true: some gauge is at the end of its range
   std::int64_t number = 0;   // counted from time zero
   std::int64_t time_ns = 0;  // sample time
 };
 
-// Errors of a sensor that its messages don't reveal.
+// Errors of a sensor that the sensor's messages don't reveal.
 struct SensorLies {
   double scale = 1.0;          // factor on the whole wrench
-  bool inverted = false;       // wrong sign
-  bool turned = false;         // by 180° about z
+  bool inverted = false;       // all readings have the wrong sign
+  bool turned = false;         // all readings are turned by 180° about z
   double offset_N = 0.0;       // along x
   double drift_N_per_s = 0.0;  // along x, starting at drifts_from_ns
   std::int64_t drifts_from_ns = 0;
@@ -34,23 +37,25 @@ struct SensorLies {
 
 class ForceSensorModel {
  public:
-  // Throws description::SetupError for a singular matrix, or a rate or counts per unit of zero.
+  // Throws description::SetupError if the matrix is singular, or if the rate or the counts per unit are zero.
   ForceSensorModel(const description::SensorPlacement& placement, const description::SensorSimulation& simulation,
                    std::uint64_t seed = 1);
 
-  // Starts with the low-pass settled at this wrench.
+  // Restarts the model at time_ns with the low-pass settled at this wrench.
   void reset(std::int64_t time_ns, const models::Wrench& wrench_S) noexcept;
-  // Sets the wrench from now until the next call. Precondition: times increase.
+  // Sets the wrench that acts from time_ns until the next call. Precondition: times increase from call to call.
   void set_wrench(std::int64_t time_ns, const models::Wrench& wrench_S) noexcept;
   [[nodiscard]] SensorLies& lies() noexcept { return lies_; }
-  // The latest sample at this time. Precondition: time_ns isn't before the second-last set_wrench().
+  // Returns the latest finished sample at time_ns. Precondition: time_ns isn't before the second-last call of
+  // set_wrench().
   [[nodiscard]] GaugeSample sample(std::int64_t time_ns) const noexcept;
-  // The wrench of that sample before conversion to gauges, noise included: fx fy fz (N), tx ty tz (Nm).
+  // Returns the wrench of the latest finished sample before its conversion to gauges, noise included: fx fy fz (N), tx
+  // ty tz (Nm).
   [[nodiscard]] std::array<double, 6> wrench(std::int64_t time_ns) const noexcept;
 
  private:
   using Vec6 = models::Vec<6>;
-  struct Piece {  // from start_ns on, the low-pass goes from `start` towards `input`
+  struct Piece {  // from start_ns on, the output of the low-pass goes from `start` towards `input`
     std::int64_t start_ns = 0;
     Vec6 start = Vec6::Zero(), input = Vec6::Zero();
   };
@@ -67,7 +72,8 @@ class ForceSensorModel {
   Vec6 bias_counts_, noise_deviation_;
   double rate_Hz_, time_constant_s_;
   std::uint64_t seed_;
-  std::int64_t step_ns_ = 0;  // length of the last step; its decay is kept, as steps are equal
+  // Length of the last step. step_decay_ is its decay; it is kept because steps have equal length.
+  std::int64_t step_ns_ = 0;
   double step_decay_ = 1.0;
   Piece before_, now_;
   SensorLies lies_;

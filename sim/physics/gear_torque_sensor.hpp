@@ -1,8 +1,10 @@
 // Simulates how a drive measures the torque of its joint's gear: by strain gauges, or by a second encoder at the link.
 //
-//   delay of delay_s → hysteresis loop → · ratio + offset + noise → rounded to counts, clamped to 16 or 32 bits
-// The hysteresis is a play operator: the reading stays until the torque has gone back by the loop's width. A second
-// encoder reads the link's angle; its offset and noise are given as torque.
+//   torque → delay by delay_s → hysteresis loop → · ratio + offset + noise → rounded to counts, clamped to 16 or 32
+//   bits
+//
+// The hysteresis loop is a play operator: after a reversal, the reading stays until the torque has changed by the width
+// of the loop. A second encoder reads the link's angle; its offset and noise are given as torques.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +16,15 @@ namespace proxarm::sim {
 
 class GearTorqueSensor {
  public:
-  // Precondition: the drive has `gear_torque`. `step_ns`: interval of set().
+  // `step_ns` is the interval between the calls of set(). Precondition: the drive has `gear_torque`.
   GearTorqueSensor(const description::DriveDescription& drive, std::int64_t step_ns, std::uint64_t seed);
 
-  // As if torque and angle had always had these values.
+  // Resets the sensor as if torque and angle had always had these values.
   void reset(double torque_Nm, double link_rad) noexcept;
-  // Call once in each step of the physics.
+  // Must be called once in each step of the physics.
   void set(double torque_Nm, double link_rad) noexcept;
-  void stick(bool stuck) noexcept { stuck_ = stuck; }  // at its present reading
+  // While stuck, the sensor repeats its last reading.
+  void stick(bool stuck) noexcept { stuck_ = stuck; }
   [[nodiscard]] std::int32_t counts() const noexcept { return counts_; }
 
  private:
@@ -32,7 +35,7 @@ class GearTorqueSensor {
   description::SimulatedDrive errors_;
   double stiffness_Nm_per_rad_;
   std::uint64_t seed_, number_ = 0;
-  std::vector<double> late_;  // delayed torques or angles; the next one is the oldest
+  std::vector<double> late_;  // torques or angles on their way through the delay; late_[next_] is the oldest
   std::size_t next_ = 0;
   double held_Nm_ = 0.0;  // output of the play operator
   std::int32_t counts_ = 0;

@@ -12,9 +12,11 @@ using models::Vec3;
 
 namespace {
 
-constexpr double small_rad = 1e-4;  // the next term of each series below is smaller by a factor of small_rad²/20
+// Below this angle, only the first term of each series below is used. The next term is smaller by a factor of
+// small_rad²/20.
+constexpr double small_rad = 1e-4;
 
-// ω of R = exp([φ]ₓ):  ω = φ̇ + (1 − cos θ)/θ² φ × φ̇ + (θ − sin θ)/θ³ φ × (φ × φ̇), θ = |φ|
+// Returns ω of R = exp([φ]ₓ):  ω = φ̇ + (1 − cos θ)/θ² φ × φ̇ + (θ − sin θ)/θ³ φ × (φ × φ̇), θ = |φ|
 Vec3 angular_velocity(const Vec3& phi, const Vec3& rate) noexcept {
   const double angle = phi.norm();
   const bool small = angle < small_rad;
@@ -29,7 +31,7 @@ Vec3 angular_velocity(const Vec3& phi, const Vec3& rate) noexcept {
 Hand::Hand(const description::HandDescription& description, const models::Pose& start_W)
     : description_(description), start_W_(start_W.translation()), R_start_(start_W.linear()) {}
 
-// Minimum jerk between waypoints, with s = (t − t_i)/(t_{i+1} − t_i):
+// Adds the minimum-jerk motion between waypoints, with s = (t − t_i)/(t_{i+1} − t_i):
 //   x = x_i + (x_{i+1} − x_i)(10 s³ − 15 s⁴ + 6 s⁵),   ẋ = (x_{i+1} − x_i)(30 s² − 60 s³ + 30 s⁴)/(t_{i+1} − t_i)
 void Hand::add_waypoints(double time_s, Intention& want) const noexcept {
   const auto& points = description_.waypoints;
@@ -56,7 +58,7 @@ namespace {
 
 Vec3 value_of(const description::TimedVector& row) { return Vec3(row.value.data()); }
 
-// The slope, at a row, of the parabola through it and its neighbours; 0 at both ends.
+// Returns the slope, at row i, of the parabola through row i and its neighbours; 0 at the first and last row:
 //   ẋ_i = (v₁ d₀ + v₀ d₁)/(d₀ + d₁),   v₀ = (x_i − x_{i−1})/d₀,  v₁ = (x_{i+1} − x_i)/d₁
 Vec3 slope(const std::vector<description::TimedVector>& rows, std::size_t i) {
   if (i == 0 || i + 1 == rows.size()) return Vec3::Zero();
@@ -66,7 +68,7 @@ Vec3 slope(const std::vector<description::TimedVector>& rows, std::size_t i) {
   return (v1 * d0 + v0 * d1) / (d0 + d1);
 }
 
-// Index of the first row after this time; the number of rows if there is none.
+// Returns the index of the first row after this time, or the number of rows if there is no such row.
 std::size_t row_after(const std::vector<description::TimedVector>& rows, double time_s) {
   const auto next =
       std::upper_bound(rows.begin(), rows.end(), time_s, [](double t, const auto& row) { return t < row.time_s; });
@@ -75,7 +77,8 @@ std::size_t row_after(const std::vector<description::TimedVector>& rows, double 
 
 }  // namespace
 
-// With s as above, d = t_{i+1} − t_i, places x₀ and x₁ and slopes m₀ and m₁:
+// Adds the motion along the trajectory. With s = (t − t_i)/d, d = t_{i+1} − t_i, the rows' places x₀ and x₁ and slopes
+// m₀ and m₁:
 //   x = x₀ + (x₁ − x₀)(3 s² − 2 s³) + d (m₀ (s − 2 s² + s³) + m₁ (s³ − s²))
 void Hand::add_trajectory(double time_s, Intention& want) const noexcept {
   const auto& rows = description_.trajectory;
@@ -98,12 +101,13 @@ Vec3 Hand::data_force_W(double time_s) const noexcept {
   if (rows.empty() || time_s > rows.back().time_s) return Vec3::Zero();
   const std::size_t next = row_after(rows, time_s);
   if (next == 0) return Vec3::Zero();
-  if (next == rows.size()) return value_of(rows.back());  // exactly at the last row's time
+  if (next == rows.size()) return value_of(rows.back());  // time_s is exactly the last row's time
   const double s = (time_s - rows[next - 1].time_s) / (rows[next].time_s - rows[next - 1].time_s);
   return (1.0 - s) * value_of(rows[next - 1]) + s * value_of(rows[next]);
 }
 
-// The multisine is added: Σ a_j d_j sin(2π f_j t + φ_j), from time zero on; before, it rests at its start.
+// Returns the sum of the start position, the waypoints' motion, the trajectory and the multisine Σ a_j d_j sin(2π f_j t
+// + φ_j). Before time zero, the multisine keeps its value of time zero.
 Intention Hand::intention(double time_s) const noexcept {
   Intention result;
   result.position_W = start_W_;
@@ -123,8 +127,9 @@ Intention Hand::intention(double time_s) const noexcept {
 }
 
 namespace {
-// Uniform between −1 and 1, a function of both numbers: SplitMix64's last step (Steele, Lea, Flood, "Fast splittable
-// pseudorandom number generators", 2014), and 53 of its bits.
+// Returns a number between −1 and 1 that is determined by both arguments and distributed uniformly. Method: the output
+// function of SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014), of which 53 bits
+// are used.
 double drawn(std::uint64_t seed, std::uint64_t number) noexcept {
   std::uint64_t z = (seed << 32) + (number + 1) * 0x9E3779B97F4A7C15U;
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;

@@ -1,11 +1,11 @@
-// Noise for simulated sensors that depends on a key only, not on when or how often it is read.
+// Noise for simulated sensors. It depends only on a key, not on when or how often it is read.
 #pragma once
 
 #include <cstdint>
 
 namespace proxarm::sim {
 
-// splitmix64: mixes a counter well, so any sample's noise can be computed without the samples before it.
+// splitmix64: mixes a counter so well that the noise of any sample can be computed without the samples before it.
 inline std::uint64_t mixed(std::uint64_t x) noexcept {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
@@ -13,8 +13,9 @@ inline std::uint64_t mixed(std::uint64_t x) noexcept {
   return x ^ (x >> 31);
 }
 
-// Approximately standard normal: the sum of 12 uniform numbers of 16 bits, each of variance 1/12 (relative error
-// 2^-32). Without logarithms, so bits are equal on every machine. Ends at ±6, kurtosis 2.9.
+// Returns an approximately standard normal number: the sum of 12 uniform numbers of 16 bits, each with a variance of
+// 1/12 (relative error 2^-32). It uses no logarithms, so the result is equal to the bit on every machine. The values
+// end at ±6; the kurtosis is 2.9.
 inline double normal(std::uint64_t key) noexcept {
   std::int64_t sum = 0;
   for (std::uint64_t i = 0; i < 3; ++i) {

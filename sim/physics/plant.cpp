@@ -12,13 +12,13 @@ namespace {
 using description::Cell;
 using description::SetupError;
 
-// Longer than any brake takes to close, and far from overflow of a sum of periods.
+// Longer than any brake takes to close, and small enough that a sum of periods doesn't overflow.
 constexpr std::int64_t far_ns = 10'000'000'000;
 
 std::int64_t servo_period_ns(const Cell& cell, std::size_t drive) {
   const double rate_Hz = cell.drives[drive].simulation.servo_rate_Hz, period_ns = 1e9 / rate_Hz;
   const auto whole = static_cast<std::int64_t>(std::nearbyint(period_ns));
-  // 1e-3 ns: far above rounding errors of the division, far below a clock's resolution.
+  // The tolerance of 1e-3 ns is far above rounding errors of the division and far below the resolution of a clock.
   if (rate_Hz > 0.0 && whole > 0 && std::abs(period_ns - static_cast<double>(whole)) < 1e-3) return whole;
   throw SetupError({.file = cell.file.string(),
                     .key = "drives[" + std::to_string(drive) + "].simulation.servo_rate_Hz",
@@ -87,7 +87,7 @@ void Plant::switch_off(std::size_t axis) noexcept {
   }
 }
 
-// Once per servo period.
+// Opens or closes the brake of an axis. Must be called once per servo period.
 void Plant::move_brake(std::size_t axis) noexcept {
   Brake& brake = brakes_[axis];
   ServoLoop& servo = servos_[axis];
@@ -114,7 +114,7 @@ void Plant::step() noexcept {
     }
     all_powered = all_powered && servo.powered();
   }
-  // The person waits until the arm is enabled.
+  // The person waits until all drives are enabled.
   if (all_powered && !hand_started_) start_hand(time_ns_);
   const double hand_time_s = hand_started_ ? 1e-9 * static_cast<double>(time_ns_ - hand_start_ns_) : 0.0;
   const ToolState& tool = arm_.tool();

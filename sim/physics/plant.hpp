@@ -1,7 +1,7 @@
-// All the simulated physics on one clock: arm, servo loops, force sensor and hand.
+// All simulated physics on one clock: arm, servo loops, force sensor and hand.
 //
-// The devices on the bus use it (CANopen slaves, the sensor's protocol): they call advance_to() with the time of a
-// frame, then read encoders and gauges and set targets. Knows no bus.
+// The devices on the bus (CANopen slaves, force sensor) use it: they call advance_to() with the time of a frame, then
+// read encoders and gauges and set targets. Plant itself knows no bus.
 #pragma once
 
 #include <cstddef>
@@ -23,33 +23,34 @@
 
 namespace proxarm::sim {
 
-// The mechanics' step is the cell's shortest servo period (servo_rate_Hz), 0.25 ms by default, divided by `finer`.
+// The step of the mechanics is the cell's shortest servo period (servo_rate_Hz; 0.25 ms by default) divided by `finer`.
 struct PlantConfig {
-  std::int64_t finer = 1;  // more is slower and more accurate
+  std::int64_t finer = 1;  // a larger divisor is slower and more accurate
   std::uint64_t noise_seed = 1;
 };
 
-// Force on the handle in N, called each step. time_s is on the hand's clock: 0 until it starts, never negative.
+// Returns the force on the handle in N; called in each step. time_s is the time on the hand's clock: 0 until the clock
+// starts, never negative.
 using HandForce =
     std::function<models::Vec3(double time_s, const models::Vec3& position_W, const models::Vec3& velocity_W)>;
 
 class Plant {
  public:
-  // Starts at rest in the cell's start pose, brakes closed, drives off, at start_ns of the network's clock. Throws
-  // description::SetupError (see ArmDynamics, ForceSensorModel; also for servo periods that aren't whole nanoseconds,
-  // or no multiples of the shortest).
+  // Starts at start_ns of the network's clock: the arm is at rest in the cell's start pose, the brakes are closed and
+  // the drives are off. Throws description::SetupError as ArmDynamics and ForceSensorModel do; also if a servo period
+  // isn't a whole number of nanoseconds or isn't a multiple of the shortest servo period.
   Plant(const description::Cell& cell, const description::SensorDescription& sensor,
         const description::HandDescription& hand, std::int64_t start_ns = 0, const PlantConfig& config = {});
 
-  // Runs all steps up to this time; the state is then that of the last step, less than step_ns() before. Never goes
-  // back. noexcept, no allocation.
+  // Runs all steps up to time_ns. The state is then that of the last step, which is less than step_ns() before time_ns.
+  // Time never steps back. Allocates nothing.
   void advance_to(std::int64_t time_ns) noexcept;
   [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }  // time of the state
 
   [[nodiscard]] std::size_t axis_count() const noexcept { return servos_.size(); }
   [[nodiscard]] std::int64_t step_ns() const noexcept { return step_ns_; }
-  // A brake opens when its servo is enabled, and closes brake_delay_s after it is disabled. In between, a servo that
-  // was disabled by disable() gives no torque.
+  // A brake opens when its servo is enabled. It closes brake_delay_s after its servo is disabled. A servo that was
+  // disabled by disable() gives no torque while its brake closes.
   [[nodiscard]] ServoLoop& servo(std::size_t axis) noexcept { return servos_[axis]; }
   void enable(std::size_t axis, std::int64_t time_ns) noexcept {
     brakes_[axis].closes_in_ns = 0;
@@ -57,11 +58,12 @@ class Plant {
   }
   [[nodiscard]] const ServoLoop& servo(std::size_t axis) const noexcept { return servos_[axis]; }
   [[nodiscard]] const ForceSensorModel& force_sensor() const noexcept { return force_sensor_; }
-  // Reading of the axis' gear torque sensor; 0 if it has none.
+  // Returns the reading of the axis' gear torque sensor; 0 if the axis has no such sensor.
   [[nodiscard]] std::int32_t gear_torque_counts(std::size_t axis) const noexcept {
     return gear_torques_[axis] ? gear_torques_[axis]->counts() : 0;
   }
-  // Makes that sensor repeat its last reading, or ends that; false if the axis has none.
+  // Makes the axis' gear torque sensor repeat its last reading (true) or measure again (false). Returns false if the
+  // axis has no such sensor.
   bool stick_gear_torque(std::size_t axis, bool stuck) noexcept {
     if (gear_torques_[axis]) gear_torques_[axis]->stick(stuck);
     return gear_torques_[axis].has_value();
@@ -71,23 +73,24 @@ class Plant {
   [[nodiscard]] const ArmDynamics& arm() const noexcept { return arm_; }
   [[nodiscard]] const Hand& hand() const noexcept { return hand_; }
 
-  // Starts the hand's clock (time zero of its intention), which otherwise starts when all drives are first enabled.
+  // Starts the hand's clock, that is, sets time zero of the hand's intention. Without this call, the clock starts when
+  // all drives are enabled for the first time.
   void start_hand(std::int64_t time_ns) noexcept;
   [[nodiscard]] bool hand_started() const noexcept { return hand_started_; }
   [[nodiscard]] std::int64_t hand_start_ns() const noexcept { return hand_start_ns_; }
 
-  // Switches a servo off as a drive does that controls its brake: if its setpoint rests, it holds the axis until the
-  // brake has closed, else its torque ends at once. Enabling it cancels this.
+  // Switches a servo off in the same way as a drive that controls its brake. If the servo's setpoint rests, the servo
+  // holds the axis until the brake has closed; else its torque ends at once. Enabling the servo cancels this.
   void switch_off(std::size_t axis) noexcept;
 
-  // Puts a body into the tool's way from now on.
+  // Puts a body in the way of the tool from now on.
   void set_clamp(const Clamp& clamp) noexcept { clamp_ = clamp; }
 
-  // Replaces the hand's force from now on; its description then only gives the mass. Precondition: `force` doesn't
-  // throw.
+  // Replaces the hand's force from now on; the hand's description then gives only the mass and the torque.
+  // Precondition: `force` doesn't throw.
   void set_hand(HandForce force) { hand_force_ = std::move(force); }
 
-  // True values for summaries and studies; the controller never sees them.
+  // True values for summaries and studies. The controller never sees them.
   [[nodiscard]] const ToolState& tool() const noexcept { return arm_.tool(); }
   [[nodiscard]] models::Vec3 handle_force_W() const noexcept { return arm_.handle_force_W(); }
   [[nodiscard]] models::Vec3 handle_torque_W() const noexcept { return arm_.handle_torque_W(); }
@@ -95,8 +98,9 @@ class Plant {
  private:
   struct Brake {
     std::int64_t delay_ns = 0;      // closing delay
-    std::int64_t unpowered_ns = 0;  // time since its servo lost power
-    std::int64_t closes_in_ns = 0;  // > 0: remaining time in which the servo still holds the axis
+    std::int64_t unpowered_ns = 0;  // time since the servo lost its power
+    // If > 0: remaining time in which the servo still holds the axis.
+    std::int64_t closes_in_ns = 0;
   };
 
   void step() noexcept;
@@ -111,9 +115,10 @@ class Plant {
   std::vector<std::int64_t> servo_period_ns_;
   std::vector<Brake> brakes_;
   std::optional<Clamp> clamp_;
-  HandForce hand_force_;  // empty: force by the hand's description
+  HandForce hand_force_;  // empty: the hand's description gives the force
   std::vector<double> torque_Nm_;
-  std::vector<models::Wrench> sensed_;  // wrenches delayed by the sensor, one per step; the next one is the oldest
+  // Wrenches on their way through the sensor's delay, one per step; sensed_[next_sensed_] is the oldest.
+  std::vector<models::Wrench> sensed_;
   std::size_t next_sensed_ = 0;
   std::int64_t start_ns_, time_ns_;
   std::int64_t hand_start_ns_ = 0;

@@ -1,4 +1,4 @@
-// Converts poses of files to transforms.
+// Converts poses from files to transforms.
 #pragma once
 
 #include "models/description/cell.hpp"
@@ -6,7 +6,7 @@
 
 namespace proxarm::sim {
 
-// R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF.
+// The orientation is R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF.
 inline models::Pose to_pose(const description::PoseDescription& pose) {
   models::Pose X = models::Pose::Identity();
   X.linear() = (Eigen::AngleAxisd(pose.rpy_rad[2], models::Vec3::UnitZ()) *

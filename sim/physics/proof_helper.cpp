@@ -30,7 +30,8 @@ bool ProofHelper::enabled() const noexcept {
   return true;
 }
 
-// Compares the drives' setpoints: a standing arm yields to a push.
+// True if a drive's setpoint has changed since the last call. Encoder positions aren't used, because a standing arm
+// yields to a push.
 bool ProofHelper::was_moved() noexcept {
   bool moved = false;
   for (std::size_t axis = 0; axis < demand_counts_.size(); ++axis) {

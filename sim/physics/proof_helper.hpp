@@ -1,10 +1,10 @@
-// A simulated person who pushes the arm as `proxarm prove` asks.
+// A simulated person who pushes the arm when `proxarm prove` asks for it.
 //
-// `proxarm sim` doesn't know what the controller asks the person to do, so the helper watches the arm: during a proof,
-// the arm stands longer than elsewhere when it waits for a push. The pushes are along x, y and then x of W
-// (controller/proof/proof.hpp, Station). Each time that all drives are enabled and the arm has stood for wait_ns, the
-// helper leans on the handle for lean_ns. A drive that goes off ends this; the next proof begins again. In sessions
-// other than a proof, the pushes come at wrong times.
+// `proxarm sim` doesn't know what the controller asks the person to do, so the helper watches the arm. In a proof, the
+// arm stands longer than at any other time when it waits for a push. Whenever all drives are enabled and the arm has
+// stood for wait_ns, the helper leans on the handle for lean_ns. The pushes are along x, y and then x of W
+// (controller/proof/proof.hpp, Station). If a drive goes off, the helper lets go; in the next proof it begins again
+// with the first push. In a session without a proof, the pushes come at wrong times.
 #pragma once
 
 #include <cstdint>
@@ -15,18 +15,19 @@
 
 namespace proxarm::sim {
 
-// A push of 15 N along a unit vector of W, by a person leaning on a handle at from_W. Less if the handle yields.
+// Returns the push of a person who leans on a handle at from_W: 15 N along the unit vector along_W, less if the handle
+// yields.
 [[nodiscard]] Clamp leaning(const models::Vec3& from_W, const models::Vec3& along_W) noexcept;
 
 class ProofHelper {
  public:
-  // A proof reads a station within 0.7 s, asks for a push 0.4 s later, and uses 0.6 s of the push.
+  // A proof needs 0.7 s to read a station, asks for a push 0.4 s later, and uses 0.6 s of the push.
   static constexpr std::int64_t wait_ns = 2'000'000'000, lean_ns = 2'000'000'000;
 
-  // The plant must outlive it.
+  // The plant must outlive the helper.
   explicit ProofHelper(Plant& plant);
 
-  // Call every few milliseconds; allocates nothing.
+  // Must be called every few milliseconds. Allocates nothing.
   void on_time(std::int64_t time_ns) noexcept;
 
  private:
@@ -37,8 +38,8 @@ class ProofHelper {
 
   Plant& plant_;
   std::vector<std::int32_t> demand_counts_;
-  std::int64_t since_ns_ = 0;  // start of the present standstill or push
-  int pushes_ = 0;             // since the drives were enabled
+  std::int64_t since_ns_ = 0;  // start of the current standstill or push
+  int pushes_ = 0;             // number of pushes since the drives were enabled
   bool leans_ = false;
 };
 

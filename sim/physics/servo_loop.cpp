@@ -121,7 +121,7 @@ void ServoLoop::stop(double deceleration_rad_per_s2, std::int64_t time_ns) noexc
   if (!powered_ || phase_ == Phase::hold || phase_ == Phase::stopping) return;
   const bool from_torque = phase_ == Phase::torque;
   interpolate(time_ns);
-  if (phase_ == Phase::stopping || phase_ == Phase::hold) return;  // without targets it had already stopped
+  if (phase_ == Phase::stopping || phase_ == Phase::hold) return;  // without targets, the setpoint had already stopped
   if (from_torque) setpoint_ = {.position_rad = angle_rad_, .speed = speed_};
   begin_stop(deceleration_rad_per_s2, time_ns);
 }
@@ -145,7 +145,7 @@ double ServoLoop::update(double motor_angle_rad, std::int64_t time_ns) noexcept 
   if (phase_ == Phase::torque) {
     torque_Nm_ = std::clamp(torque_target_Nm_, -max_torque_Nm_, max_torque_Nm_);
     limited_ = torque_Nm_ != torque_target_Nm_;
-    integral_Nm_ = torque_Nm_;  // so that position control takes over without a step
+    integral_Nm_ = torque_Nm_;  // lets position control take over later without a step in torque
     return torque_Nm_;
   }
   //   v* = K_p e + f_v ṙ
@@ -158,7 +158,7 @@ double ServoLoop::update(double motor_angle_rad, std::int64_t time_ns) noexcept 
       velocity_gain_ * speed_error + integral + acceleration_feedforward_ * rotor_inertia_ * setpoint_.acceleration;
   torque_Nm_ = std::clamp(wanted, -max_torque_Nm_, max_torque_Nm_);
   const bool torque_limited = torque_Nm_ != wanted;
-  // At the torque limit, the integral only changes towards less torque.
+  // At the torque limit, the integral may only change towards a smaller torque.
   if (!torque_limited || speed_error * wanted < 0.0) integral_Nm_ = integral;
   limited_ = torque_limited || (speed_limited_ && phase_ == Phase::segment);
   return torque_Nm_;

@@ -1,15 +1,18 @@
-// The control loop inside a simulated servo drive: computes the motor torque from encoder and setpoint, and
+// The control loop inside a simulated servo drive. It computes the motor torque from encoder and setpoint, and
 // interpolates setpoints between SYNCs.
 //
-// Cascade, once per servo period h; e = r − θ, with r the interpolated setpoint and θ the encoder's angle:
+// The loop is a cascade that runs once per servo period h. With r the interpolated setpoint, θ the encoder's angle and
+// e = r − θ:
 //   v* = K_p e + f_v ṙ
 //   τ  = clamp( K_v (v* − θ̇) + K_i ∫(v* − θ̇) dt + f_a J_r r̈,  ± τ_max ),   K_v = J_r ω_v,  K_i = K_v ω_v/10
-// θ̇ is the difference of encoder counts over one servo period. All at the joint (gear ratio taken off), except counts.
+// θ̇ is the difference of encoder counts over one servo period. All quantities except counts are at the joint, that is,
+// after the gear ratio.
 //
-// Setpoints: a target given at SYNC is reached one interpolation period later, along a straight line from the present
-// setpoint. For the feed-forward, ṙ ramps from the last segment's speed to this one's: a change of speed is one period
-// of constant torque instead of an impulse. Without a new target, the last speed is kept for a quarter of a period (a
-// frame may hold back SYNC), then the setpoint decelerates to rest at the drive's limit.
+// A target that is given at SYNC is reached one interpolation period later, along a straight line from the current
+// setpoint. For the feed-forward, ṙ ramps from the speed of the last segment to the speed of the new segment: a change
+// of speed thus needs one period of constant torque instead of an impulse. If no new target comes, the last speed is
+// kept for a quarter of a period, because a frame may delay SYNC. The setpoint then decelerates to rest at the drive's
+// limit.
 #pragma once
 
 #include <cstdint>
@@ -18,45 +21,47 @@
 
 namespace proxarm::sim {
 
-// Times are in ns of the network's clock; nothing here allocates or throws.
+// Times are in ns of the network's clock. The functions neither allocate nor throw.
 class ServoLoop {
  public:
   ServoLoop(const description::DriveDescription& drive, std::int64_t servo_period_ns) noexcept;
 
-  // Power. enable() holds the present position, with the torque that the drive held when it was last enabled (at first:
-  // holding_torque_Nm, which carries gravity), so that a load doesn't drop when the brake opens.
-  void reset(double motor_angle_rad, double holding_torque_Nm) noexcept;  // without power
+  // Switch the power. enable() holds the current position. To keep a load from dropping when the brake opens, enable()
+  // begins with the torque that the drive held when it was last enabled; the first time this is holding_torque_Nm,
+  // which carries gravity.
+  void reset(double motor_angle_rad, double holding_torque_Nm) noexcept;  // switches the power off
   void enable(std::int64_t time_ns) noexcept;
   void disable() noexcept;
   [[nodiscard]] bool powered() const noexcept { return powered_; }
 
-  // 60C2h. Takes effect with the next target.
+  // Sets the interpolation period (60C2h). It takes effect with the next target.
   void set_interpolation_period_ns(std::int64_t period_ns) noexcept { period_ns_ = period_ns; }
 
-  // Limits the motor's torque, given at the joint.
+  // Limits the motor's torque; max_torque_Nm is the torque at the joint.
   void set_max_torque_Nm(double torque_Nm) noexcept { max_torque_Nm_ = torque_Nm; }
 
-  // Call at SYNC with the latched 607Ah. Ignored without power. A setpoint faster than the drive's top speed lags
-  // behind its target (see limited()).
+  // Must be called at SYNC with the latched 607Ah. Ignored without power. If the target requires more than the drive's
+  // top speed, the setpoint lags behind its target (see limited()).
   void set_target(std::int32_t target_counts, std::int64_t time_ns) noexcept;
-  // Decelerates to rest (rad/s²) and holds, until the next set_target(). For a SYNC without a new target, quick stop
-  // and halt.
+  // Decelerates to rest (rad/s²) and holds until the next set_target(). Used for a SYNC without a new target, for quick
+  // stop and for halt.
   void stop(double deceleration_rad_per_s2, std::int64_t time_ns) noexcept;
-  // Cyclic synchronous torque: 6071h as torque at the joint, without position control, until set_target() or stop().
+  // Cyclic synchronous torque: applies 6071h, converted to torque at the joint, without position control, until
+  // set_target() or stop().
   void set_torque_Nm(double torque_Nm) noexcept;
 
-  // One servo period: samples the encoder and returns the motor torque at the joint, Nm, for this period; 0 without
-  // power. Precondition: time_ns = k · servo period.
+  // Runs one servo period: samples the encoder and returns the motor torque at the joint (Nm) for this period; 0
+  // without power. Precondition: time_ns is a multiple of the servo period.
   double update(double motor_angle_rad, std::int64_t time_ns) noexcept;
 
-  // 6064h, 6062h, 60F4h and others, at the last update().
+  // The values of 6064h, 6062h, 60F4h and others at the last update().
   [[nodiscard]] std::int32_t position_counts() const noexcept { return counts_; }
   [[nodiscard]] std::int32_t demand_counts() const noexcept { return to_counts(setpoint_.position_rad); }
   [[nodiscard]] double following_error_rad() const noexcept { return setpoint_.position_rad - angle_rad_; }
   [[nodiscard]] double speed_rad_per_s() const noexcept { return speed_; }
   [[nodiscard]] double torque_Nm() const noexcept { return torque_Nm_; }
-  [[nodiscard]] bool limited() const noexcept { return limited_; }               // torque or speed at its limit
-  [[nodiscard]] bool at_rest() const noexcept { return phase_ == Phase::hold; }  // of the setpoint
+  [[nodiscard]] bool limited() const noexcept { return limited_; }               // torque or speed is at its limit
+  [[nodiscard]] bool at_rest() const noexcept { return phase_ == Phase::hold; }  // true: the setpoint is at rest
 
  private:
   enum class Phase : std::uint8_t { hold, segment, stopping, torque };
@@ -72,20 +77,20 @@ class ServoLoop {
   void interpolate(std::int64_t time_ns) noexcept;
   void begin_stop(double deceleration, std::int64_t time_ns) noexcept;
 
-  // Fixed
+  // Constant.
   double counts_per_rad_, offset_counts_, max_torque_Nm_, max_speed_, max_deceleration_;
   double rotor_inertia_, position_gain_, velocity_gain_, integral_gain_;
   double velocity_feedforward_, acceleration_feedforward_, servo_period_s_;
   std::int64_t period_ns_ = 1'000'000;
 
-  // Setpoint. segment_* also describe a stop: its start position, speed and time.
+  // The setpoint. For a stop, segment_* hold start position, speed and start time of the stop.
   Phase phase_ = Phase::hold;
   std::int64_t segment_start_ns_ = 0, segment_end_ns_ = 0;
   double segment_from_rad_ = 0.0, segment_speed_ = 0.0, previous_speed_ = 0.0;
   double stop_deceleration_ = 0.0, torque_target_Nm_ = 0.0;
   Setpoint setpoint_;
 
-  // Loop
+  // State of the loop.
   bool powered_ = false, limited_ = false, speed_limited_ = false;
   std::int32_t counts_ = 0;
   double angle_rad_ = 0.0, speed_ = 0.0, integral_Nm_ = 0.0, torque_Nm_ = 0.0;

@@ -10,6 +10,7 @@
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/live/session_status.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/session_checks.hpp"
 #include "controller/session/bring_up.hpp"
 #include "models/base/quantity.hpp"
 #include "models/base/setup_error.hpp"

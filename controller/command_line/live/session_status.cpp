@@ -1,4 +1,5 @@
 #include "controller/command_line/live/session_status.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 
 #include <algorithm>
 #include <array>

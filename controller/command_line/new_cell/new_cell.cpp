@@ -16,6 +16,7 @@
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/trials/mass_advice.hpp"
 #include "controller/command_line/trials/trial.hpp"

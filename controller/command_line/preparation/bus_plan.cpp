@@ -7,6 +7,7 @@
 #include <random>
 
 #include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/command_line/preparation/session_checks.hpp"
 #include "controller/session/identifiers.hpp"
 #include "fieldbus/can/byte_order.hpp"
 #include "fieldbus/can/socket_can_network.hpp"

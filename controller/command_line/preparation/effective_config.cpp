@@ -1,4 +1,5 @@
 #include "controller/command_line/preparation/effective_config.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 
 #include <yaml-cpp/yaml.h>
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/session_checks.hpp"
 #include "controller/limits/step_limits.hpp"
 #include "controller/plausibility/doubts.hpp"
 #include "controller/setpoints/held_weight.hpp"

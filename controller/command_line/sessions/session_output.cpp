@@ -6,6 +6,7 @@
 
 #include "controller/command_line/entry/exit_status.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/command_line/sessions/view_process.hpp"
 #include "controller/library/session_files.hpp"
 #include "controller/library/session_summary.hpp"

@@ -1,4 +1,5 @@
 #include "controller/command_line/trials/inertia_advice.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 
 #include <algorithm>
 #include <vector>
