@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "controller/command_line/preparation/session_loops.hpp"
+
 namespace proxarm::controller {
 
 LedPoses::LedPoses(const command_line::PreparedSession& session, const command_line::RunOptions& options,

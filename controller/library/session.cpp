@@ -10,6 +10,7 @@
 
 #include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/preparation/zero_file.hpp"
 #include "controller/command_line/preparation/session_loops.hpp"
