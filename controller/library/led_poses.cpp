@@ -1,4 +1,3 @@
-#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/library/led_poses.hpp"
 
 #include <algorithm>

@@ -13,7 +13,6 @@
 #include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/preparation/zero_file.hpp"
-#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/library/led_poses.hpp"
 #include "controller/library/session_files.hpp"
 #include "controller/library/session_summary.hpp"

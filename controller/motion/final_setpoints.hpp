@@ -35,8 +35,8 @@ class FinalSetpoints {
     bool guarded = false;      // the tool guard held a setpoint back
     // The wanted setpoints can't be caught up; the motion must continue from the commanded ones. A small lag is caught
     // up instead: to continue from setpoints takes the motors' angles for the links' and would shake the tool. A lag is
-    // small if it moves the tool no further than limits.following_error_rad of the joint with the longest lever; without
-    // a revolute joint, no further than that number of metres.
+    // small if it moves the tool no further than limits.following_error_rad of the joint with the longest lever;
+    // without a revolute joint, no further than that number of metres.
     bool differs = false;
   };
   struct Bounds {
