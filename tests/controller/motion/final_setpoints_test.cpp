@@ -20,6 +20,7 @@ FinalSetpoints::Result with_wanted(const std::string& cell_file, int joint, doub
   Measured measured;
   measured.motor_rad = measured.link_rad = measured.drive_target_rad = arm.start_rad();
   measured.moved_rad = measured.jump_rad = JointVector::Zero(arm.axes());
+  measured.answers = {JointVector::Zero(arm.axes()), JointVector::Zero(arm.axes())};
   measured.tool_W = arm.tool_pose(arm.start_rad()).translation();
   JointVector wanted = arm.start_rad();
   wanted[joint] += away;
