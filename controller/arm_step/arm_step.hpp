@@ -183,7 +183,7 @@ class ArmStep final : public FollowableStep {
   bool eases_ = false;          // eases(): a small part of U's box is tried first
   double ease_ = 0.0;           // allowed change of a joint's step in box_, in halves of the joint's acceleration
   models::ToolKinematics from_;  // kinematics at c(k−1)
-  // Inverse kinematics of the pose that was asked last; after the step, the step's end.
+  // During the step: inverse kinematics of the pose last asked for. After the step: the inverse kinematics at its end.
   models::InverseKinematicsResult solution_;
   models::Vec3 asked_W_ = models::Vec3::Zero();
   // The orientation that this step shall reach: R_WT, or one between the present orientation and R_WT.

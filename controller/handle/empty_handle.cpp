@@ -11,8 +11,9 @@ using models::Vec3;
 constexpr double filter_s = 0.015;
 // Multiples of σ_f (noise) and of σ/√n (tare) in the noise band. One of three axes exceeds 8 σ_f once in 1e15 samples.
 constexpr double noise_deviations = 8.0, tare_deviations = 4.0;
-// The distance and the shortest time within a band after which the handle counts as empty. Calm: within the noise band.
-// Quiet: within the wider band. longest_s is the longest time for both bands.
+// The handle counts as empty when the force has stayed within a band for the time in which the proxy, at its speed,
+// covers this distance: at least the shortest time of the band, at most longest_s. Calm: the noise band. Quiet: the
+// wider band.
 constexpr double calm_way_m = 0.02, shortest_calm_s = 0.06;
 constexpr double quiet_way_m = 0.04, shortest_quiet_s = 0.5;
 constexpr double longest_s = 1.5;

@@ -115,7 +115,7 @@ class Measurement {
   };
 
   [[nodiscard]] double standing_limit_N(const SessionSettings& settings) const noexcept;
-  [[nodiscard]] double tare_error_N() const noexcept;  // upper bound of the mean's error by the noise
+  [[nodiscard]] double tare_error_N() const noexcept;  // upper bound of the error that noise leaves in the tared bias
   void read_encoders() noexcept;
   void place_elbow() noexcept;
   void read_sensor() noexcept;

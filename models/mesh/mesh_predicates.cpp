@@ -142,9 +142,8 @@ bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
   for (Eigen::Index i = 0; i < 3; ++i) {
     const Eigen::Index j = (i + 1) % 3;
     const double m = d[i] * e[j], n = d[j] * e[i];
-    if (std::abs(m - n) > 8.0 * u * (std::abs(m) + std::abs(n)))
-      // Each difference of products has an error of at most 4 u.
-      return false;
+    // m − n has an error of at most 4 u (|m| + |n|): beyond twice that it is certainly not zero.
+    if (std::abs(m - n) > 8.0 * u * (std::abs(m) + std::abs(n))) return false;
   }
   const ExactVector v(a, b), w(a, c);
   return minor_of(v, w, 0, 1).sign() == 0 && minor_of(v, w, 1, 2).sign() == 0 && minor_of(v, w, 2, 0).sign() == 0;

@@ -7,8 +7,8 @@ namespace proxarm::models {
 namespace {
 
 constexpr int kMostPoses = 50;
-// With bends the iteration is Newton's method. As long as its steps are above kNear_m, local problems needn't be solved
-// exactly: solved to this share of the last step, they lead equally near to the fixed point.
+// With bends (bends.hpp) the iteration is Newton's method. While its last step is longer than kNear_m, a local problem
+// is solved only to kRoughShare of that step. An exact solution wouldn't come nearer to the fixed point.
 constexpr double kRoughShare = 1e-5;
 constexpr double kNear_m = 1e-9;
 // Pairs further away than this many times the distance from q to p̂ aren't looked at, because a stiff coupling rarely
@@ -80,8 +80,8 @@ Iteration::Next Iteration::iterate(const ToolPose& p_hat, const ToolPose& q_old,
   const bool roughly = attempt_->bends && at.k > 0 && at.last_m > kNear_m;
   const double rough = roughly ? kRoughShare * std::min(at.last_m / state_->bodies.motion_m(q, p_hat), 1.0) : 0.0;
   const double still_m = attempt_->bends && !roughly && at.last_m < kNear_m ? at.rounding_m : 0.0;
-  // In the first iterate, contacts of the part before count only if an object moves, which may have moved away from the
-  // tool.
+  // In the first iterate, contacts of the step's previous part count only if some object moves, since that object may
+  // have left the tool.
   const bool pressed = (at.k > 0 || state_->bodies.something_approaches()) && state_->candidates.pressed.count > 0;
   Twist delta;
   const bool solved = local_step_.solve(q, e, q_old, rough, still_m, delta);

@@ -7,8 +7,8 @@
 //    contact_problem.hpp). The solution of the local problem is the next pose. This is repeated with new gaps and
 //    normals until the pose no longer changes (iteration.hpp).
 // 3. A face or an edge holds the tool on the side on which the tool was at q(k−1) (rigid_bodies/sides.hpp). A long step
-//    is taken in parts (rigid_step.hpp, step_in_parts.hpp). Each part is so short that no feature gets beyond the reach
-//    of the sides.
+//    is taken in parts (rigid_step.hpp, step_in_parts.hpp). Each part is so short that no feature gets further behind
+//    another one than the recorded sides are valid (Sides::reach_m).
 // 4. If the contacts of a solution did work on the tool, the tool has come to a wrong side. The step is then taken in
 //    smaller parts. If these have no solution either, the step is unresolved.
 // 5. Contact with a moving object is judged in the object's frame (rigid_bodies/rigid_bodies.hpp, step_in_batches.hpp).

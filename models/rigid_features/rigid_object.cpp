@@ -91,8 +91,8 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
   sort_out(vertices_by_face, owned_vertices_, first_vertex_);
 }
 
-// Returns on which side the fronts of the faces are, as outwards() does. A mesh may consist of several bodies, and a
-// body may have hollows. Therefore the largest face of each connected piece is tested.
+// Returns 1 if the fronts of the faces are outside, −1 if they are inside. A mesh may consist of several bodies, and a
+// body may have hollows: so the largest face of each connected piece is tested. Throws if the pieces disagree.
 double TriangleFeatures::front_side() const {
   const auto faces = static_cast<std::uint32_t>(mesh_->size());
   // leads from a vertex to the vertex that represents its piece

@@ -229,7 +229,7 @@ class Groove {
   GrooveSearch search_;
   // rounding_: sum of the heights' rounding. w_rounding_: largest |w| of a proxy that counts as in the line.
   double rounding_, w_rounding_;
-  // s_p_: p along e. F_n_, F_t_: x₀ − p across e, along n₁ and t₁.
+  // s_p_: p along e. F_n_, F_t_: the components of x₀ − p along n₁ and t₁, which are perpendicular to e.
   double s_p_, F_n_, F_t_;
   // Each contact's q along e (s) and across e (w). A |w| within rounding is set to 0.
   std::array<double, 2> s_q_, w_;
