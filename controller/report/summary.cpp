@@ -228,13 +228,16 @@ void SummaryBuilder::State::count_limit(const std::string& parameter, RecordFlag
   limit.time_s += seconds(period_ns);
 }
 
-// Follows a mass, damping or spring that is set during rendering: it counts from then on, and the last mass is the
-// wanted one.
+// Follows a mass, damping or spring that is set during rendering, or before its first cycle: it counts from then on, and
+// the last mass is the wanted one.
 void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
   if (record.tool_mass_kg > 0.0 && config.handle_mass_kg > 0.0) config.handle_mass_kg = record.tool_mass_kg;
   if (record.proxy_mass_kg != mass_kg) {
-    if (mass_kg > 0.0) {
-      config.wanted_mass_kg = record.proxy_mass_kg + config.handle_mass_kg;
+    const double felt_kg = record.proxy_mass_kg + config.handle_mass_kg;
+    constexpr double rounding_kg = 1e-9;  // of a mass below a tonne, with digits of a file
+    const bool set_before = record.proxy_mass_kg > 0.0 && std::abs(felt_kg - config.wanted_mass_kg) > rounding_kg;
+    if (mass_kg > 0.0 || set_before) {
+      config.wanted_mass_kg = felt_kg;
       apparent = ApparentMass(config.period_s);
       felt = FeltMassCurve(config.period_s);
     }

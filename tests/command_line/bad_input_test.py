@@ -17,6 +17,11 @@ class Files(ProgramTest):
             self.assert_refused(self.call("run", *option, "nowhere.yaml"), "nowhere.yaml: no such file")
         self.assert_refused(self.call("check", "nowhere.yaml"), "nowhere.yaml: no such file")
 
+    def test_an_option_is_no_value(self):
+        # The session was written to a folder named --duration=1s, and took ten seconds.
+        for option in ("--record", "--black-box", "--plot", "--scene"):
+            self.assert_refused(self.call("run", option, "--duration=1s"), option, "--duration=1s", "another option")
+
     def test_a_folder_is_no_file(self):
         for option in ([], ["--scene"], ["--hand"]):
             self.assert_refused(self.call("run", *option, "/tmp"), "/tmp: is a folder")

@@ -260,7 +260,7 @@ class Options(ProgramTest):
     def test_whatever_is_wrong_is_said_as_the_program_says_it(self):
         for options, words in (({"mas": 4}, ["--mas=4.0"]), ({"turning": 1}, ["--turning=1.0"]), ({"order": 3}, ["--order", "3"]),
                                ({"signals": "csv"}, ["--signals", "csv"]), ({"mass": True}, ["--mass"]),
-                               ({"mass": ""}, ["--mass", ""]),
+                               ({"mass": ""}, ["--mass", ""]), ({"record": True, "duration": 1}, ["--record", "--duration=1s"]),
                                ({"fault": "axis_9:silent"}, ["--fault", "axis_9:silent"]), ({"set": "mass=3"}, ["--set", "mass=3"]),
                                ({"do": ["jump@1s"]}, ["--do", "jump@1s"]), ({"inertia": -1}, ["--inertia", "-1"]),
                                ({"tool": "absent.yaml"}, ["--tool", "absent.yaml"]), ({"passivity": "perhaps"}, ["--passivity", "perhaps"]),

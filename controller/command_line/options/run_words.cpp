@@ -42,6 +42,19 @@ void add_supervision_options(CLI::App& app, RunOptions& options) {
                "real drives of a cell that `proxarm prove` hasn't proven on them");
 }
 
+// Refuses an option in the place of a value: in `--record --duration=1s` the folder was left out.
+void refuse_options_as_values(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_items_expected_max() == 0) continue;
+    option->check([option](const std::string& value) -> std::string {
+      if (value.rfind("--", 0) != 0) return {};
+      throw description::SetupError({.key = option->get_name(),
+                                     .found = value + ", which is another option",
+                                     .expected = option->get_type_name()});
+    });
+  }
+}
+
 }  // namespace
 
 void add_run_options(CLI::App& app, RunOptions& options) {
@@ -114,6 +127,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_flag("--verbose", options.verbose, "print all figures, not the summary's eight lines");
   app.add_flag("--force-unstable", options.force_unstable,
                "simulation only: run with a mass that is predicted unstable");
+  refuse_options_as_values(app);
 }
 
 namespace {

@@ -222,6 +222,18 @@ TEST(Summary, SeesDeepestPenetrationOfTheProxy) {
   EXPECT_EQ(builder.finish().penetration_max_m, 3e-9);
 }
 
+// A mass that was set while the sensor was tared had the verdict that the arm felt 50 % too heavy.
+TEST(Summary, TakesAMassThatWasSetBeforeTheFirstRenderedCycleForTheWantedOne) {
+  const Session session{.mass_kg = 6.0};
+  SummaryBuilder builder({.period_s = T, .wanted_mass_kg = 4.0, .handle_mass_kg = session.handle_kg});
+  for (std::uint64_t k = 0; k < 5000; ++k) {
+    CycleRecord record = session.record(k);
+    record.proxy_mass_kg = 6.0 - session.handle_kg;
+    builder.add(record);
+  }
+  EXPECT_NEAR(builder.finish().wanted_mass_kg, 6.0, 1e-12);
+}
+
 TEST(Summary, HasNothingToSayOfNothing) {
   SummaryBuilder builder({});
   const Summary s = builder.finish();
