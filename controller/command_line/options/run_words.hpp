@@ -8,7 +8,7 @@
 
 #include "controller/command_line/preparation/run_options.hpp"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming)
 class App;
 }
 

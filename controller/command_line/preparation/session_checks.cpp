@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "controller/command_line/preparation/session_loops.hpp"
+#include "controller/rendering/torque_rendering.hpp"
 #include "fieldbus/cia402/cia402_units.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/tool_inertia.hpp"

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "controller/session/bring_up.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/tool_inertia.hpp"
 #include "models/rigid_shapes/furthest.hpp"
