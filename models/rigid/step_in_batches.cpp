@@ -23,7 +23,7 @@ constexpr int kOfPose = 150;
 
 bool StepInBatches::take() noexcept {
   state_->bodies.move_to(0.0);
-  state_->gather(way_.q_old, kGatheredParts * each_m_);
+  state_->gather(way_.q_old, kGatheredParts * way_.each_m());
   begin_batch();
   state_->touches.count = 0;
   Next next = Next::on;
@@ -48,7 +48,7 @@ void StepInBatches::begin_batch() noexcept {
   if (state_->gather_if_far(reached_)) {
     attempt_->looks_left -= kOfPose + 4 * static_cast<int>(state_->candidates.triangles_near);
   }
-  state_->take_sides(reached_, each_m_);
+  state_->take_sides(reached_, way_.each_m());
 }
 
 // Moves the tool freely by as many parts as there is room for. Returns whether it did.
@@ -58,12 +58,12 @@ bool StepInBatches::go_freely() noexcept {
   // The tool may be off its path to p̂, because an object held it before.
   const double off = k_ == 0 ? 0.0 : bodies.motion_m(way_.goal(state_->bodies, k_), reached_);
   const int left = way_.parts - k_;
-  const double enough = (off + each_m_ * left) / kOfRoom;
+  const double enough = (off + way_.each_m() * left) / kOfRoom;
   // If no pair was gathered, no object is nearer than the reach of the pairs.
   const bool nothing_near = candidates.count == 0;
   double room = nothing_near ? candidates.gathered_reach_m - candidates.came_m(bodies, reached_) : 0.0;
   if (room < enough) room = std::max(room, free_room_m(*state_, reached_, enough, attempt_->looks_left));
-  const double free = std::floor(std::min((kOfRoom * room - off) / each_m_ + 1e-9, static_cast<double>(left)));
+  const double free = std::floor(std::min((kOfRoom * room - off) / way_.each_m() + 1e-9, static_cast<double>(left)));
   if (free < (nothing_near ? 1.0 : 2.0) && !(free >= 0.0 && static_cast<int>(free) == left)) return false;
   k_ += static_cast<int>(free);
   state_->bodies.move_to(way_.share(k_));
@@ -78,7 +78,7 @@ StepInBatches::Next StepInBatches::go_held() noexcept {
   const int to = std::min(k_ + batch_, way_.parts);
   const ToolPose start = state_->bodies.carry_to(reached_, way_.share(to));
   ToolPose p = way_.goal(state_->bodies, to);
-  const double ahead = state_->bodies.motion_m(p, start), most = 2.0 * each_m_ * batch_;
+  const double ahead = state_->bodies.motion_m(p, start), most = 2.0 * way_.each_m() * batch_;
   const bool last = to == way_.parts && ahead <= most;
   if (ahead > most) p = moved(start, difference(p, start) * (most / ahead));
   allow_part(last, *state_, *attempt_);
@@ -87,7 +87,7 @@ StepInBatches::Next StepInBatches::go_held() noexcept {
   const bool solved = iteration_->settle(p, way_.q_old, next);
   attempt_->looks_left -= kOfPose * (before - attempt_->poses_left);
   const double came = state_->sides.came_m(state_->bodies, next);
-  if (batch_ > 1 && !(solved && came <= each_m_)) {  // the batch was too long
+  if (batch_ > 1 && !(solved && came <= way_.each_m())) {  // the batch was too long
     attempt_->overflow = false;
     batch_ = std::max(batch_ / (kLonger * kLonger), 1);
     state_->bodies.move_to(way_.share(k_));
@@ -96,7 +96,7 @@ StepInBatches::Next StepInBatches::go_held() noexcept {
   reached_ = solved ? next : start;
   if (solved) {
     // The next batch gets as many parts as the tool, at its present speed, needs for the motion that one part allows.
-    const double longer = std::min(kOfRoom * each_m_ / came, double{kLonger}) * batch_;
+    const double longer = std::min(kOfRoom * way_.each_m() / came, double{kLonger}) * batch_;
     batch_ = static_cast<int>(std::clamp(longer, 1.0, static_cast<double>(way_.parts)));
   } else {
     // As in StepInParts, only the forces of the last part are reported. Before it, any pose to which the tool comes
@@ -121,7 +121,7 @@ void StepInBatches::wait_for_objects() noexcept {
   for (const MovingEntry& m : std::as_const(bodies).moving()) {
     if (m.close) most = std::max(most, m.mover.way_m(reached_.position, bodies.setup().reach_m));
   }
-  const double done = way_.share(k_), rest = (1.0 - done) * most / each_m_;
+  const double done = way_.share(k_), rest = (1.0 - done) * most / way_.each_m();
   const int parts = static_cast<int>(std::clamp(std::ceil(rest), 1.0, 8.0 * kMostParts));
   for (int k = 1; k <= parts; ++k) {
     bodies.move_to(done + (1.0 - done) * k / parts);

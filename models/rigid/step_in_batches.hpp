@@ -37,7 +37,6 @@ class StepInBatches {
   Iteration* iteration_;
   Fallback* fallback_;
   Way way_;
-  double each_m_ = way_.each_m();
   int k_ = 0, batch_ = 1;  // number of parts that are done; number of parts of the next batch
   ToolPose reached_ = way_.q_old;
 };

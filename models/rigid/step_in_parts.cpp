@@ -54,8 +54,9 @@ bool StepInParts::take_parts(const Way& way, double each_m, const Range& range, 
       // Only the forces of the last part are reported. Before it, any pose to which the tool comes without passing
       // through an object is good enough.
       const bool may = approaches || (k < range.last && left_out++ < kMostLeftOut);
-      attempt_->overflow = attempt_->overflow && !may;
-      if (!may || !fallback_->step_aside(q) || k == range.last) return false;
+      if (!may) return false;
+      attempt_->overflow = false;
+      if (!fallback_->step_aside(q) || k == range.last) return false;
     }
     if (k < way.parts) {
       state_->gather_if_far(q);

@@ -142,13 +142,12 @@ Cylinder CylinderGaps::seen_from_body(const Pair& pair, const View& at) const no
 }
 
 const Cylinder& CylinderGaps::kept_cylinder(const Pair& pair, const View& at) noexcept {
-  if (!known_ || part_ != pair.part || entry_ != pair.entry) {
-    known_ = true;
+  if (!cylinder_ || part_ != pair.part || entry_ != pair.entry) {
     part_ = pair.part;
     entry_ = pair.entry;
     cylinder_ = seen_from_body(pair, at);
   }
-  return cylinder_;
+  return *cylinder_;
 }
 
 int CylinderGaps::touch(const Pair& pair, const View& at, double beside, Places& out) noexcept {

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "models/rigid_bodies/sides.hpp"
 #include "models/rigid_cylinder/beside_cylinder.hpp"
@@ -50,9 +51,8 @@ class CylinderGaps {
   const Sides* sides_;
   // The cylinder of the last pair, in the body's frame. It is kept because many consecutive pairs have the same part
   // and entry.
-  bool known_ = false;
   std::uint16_t part_ = 0, entry_ = 0;
-  Cylinder cylinder_;
+  std::optional<Cylinder> cylinder_;
 };
 
 }  // namespace proxarm::models

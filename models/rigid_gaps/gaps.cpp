@@ -32,34 +32,37 @@ void Gaps::remember_lowest(Pair& pair, const View& at) const noexcept {
   if (!lowest.isZero(0.0)) pair.level = {lowest.x(), lowest.y()};
 }
 
-int Gaps::evaluate(const Pair& pair, const View& at, double beside, Places& out) noexcept {
-  if (is_in_field(pair.kind)) return evaluate_field(pair, at, out);
-  if (is_of_cylinder(pair.kind)) return cylinders_.touch(pair, at, beside, out);
-  const std::optional<Touch> touch = evaluate_one(pair, at, beside);
-  if (!touch) return 0;
-  out[0] = *touch;
-  if (bodies_->entry(pair).mesh() != nullptr) out[0].gap -= kLift_m;
-  return 1;
+std::optional<Touch> Gaps::touch_of(const Pair& pair, const View& at, double beside) const noexcept {
+  if (pair.kind == PairKind::point_field) return in_field(pair, at);
+  std::optional<Touch> touch = between_features(pair, at, beside);
+  if (touch && bodies_->entry(pair).mesh() != nullptr) touch->gap -= kLift_m;
+  return touch;
 }
 
-int Gaps::evaluate_field(const Pair& pair, const View& at, Places& out) const noexcept {
+int Gaps::touches_of(const Pair& pair, const View& at, double beside, Places& out) noexcept {
+  return is_of_cylinder(pair.kind) ? cylinders_.touch(pair, at, beside, out) : rim_in_field(pair, at, out);
+}
+
+Touch Gaps::in_field(const Pair& pair, const View& at) const noexcept {
   const Solid& own = bodies_->part(pair).solid;
+  Touch out;
+  with_flat_or_hollow(bodies_->entry(pair).object,
+                      [&](const auto& shape) { out = touch(shape, at * own.points[pair.own], own.radius); });
+  return out;
+}
+
+int Gaps::rim_in_field(const Pair& pair, const View& at, Places& out) const noexcept {
+  const Solid::Rim rim = rim_at(bodies_->part(pair).solid.rims[pair.own], at);
   int count = 0;
   with_flat_or_hollow(bodies_->entry(pair).object, [&](const auto& shape) {
-    if (pair.kind == PairKind::point_field) {
-      out[0] = touch(shape, at * own.points[pair.own], own.radius);
-      count = 1;
-      return;
-    }
     std::array<Vec3, 4> places;
-    count = nearest_of_rim(shape, rim_at(own.rims[pair.own], at), {pair.level[0], pair.level[1]}, places);
+    count = nearest_of_rim(shape, rim, {pair.level[0], pair.level[1]}, places);
     for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) out[k] = touch(shape, places[k], 0.0);
   });
   return count;
 }
 
-// Returns the touch of a pair that touches at one place at most.
-std::optional<Touch> Gaps::evaluate_one(const Pair& pair, const View& at, double beside) const noexcept {
+std::optional<Touch> Gaps::between_features(const Pair& pair, const View& at, double beside) const noexcept {
   const Solid& own = bodies_->part(pair).solid;
   const double radii = own.radius + radius_of(bodies_->entry(pair).solid());
   switch (pair.kind) {
@@ -173,12 +176,10 @@ std::optional<Touch> Gaps::over_valley(const Pair& pair, const View& at, const F
   return Touch{at * Vec3(p - (gap + radius) * n), -(at.R * n), gap - lift};
 }
 
-int Gaps::evaluate_over(const Pair& pair, const View& at, const FootReach& feet, Places& out) noexcept {
-  if (const std::optional<Touch> touch = over_valley(pair, at, feet)) {
-    out[0] = *touch;
-    return 1;
-  }
-  return pair.kind == PairKind::edges ? evaluate(pair, at, std::max(feet.beside, feet.over), out) : 0;
+std::optional<Touch> Gaps::touch_over(const Pair& pair, const View& at, const FootReach& feet) const noexcept {
+  if (const std::optional<Touch> touch = over_valley(pair, at, feet)) return touch;
+  if (pair.kind != PairKind::edges) return {};
+  return touch_of(pair, at, std::max(feet.beside, feet.over));
 }
 
 bool Gaps::is_beyond_edge(const Pair& pair, double gap, const View& at) const noexcept {

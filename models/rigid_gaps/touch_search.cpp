@@ -71,14 +71,18 @@ void TouchSearch::look_at(std::size_t index, const View& at, const MovingEntry* 
   const FootReach& feet = attempt_->feet;
   attempt_->looks_left -= extra_cost(pair.kind);
   if (is_flat_rim(pair.kind)) gaps.remember_lowest(pair, at);
-  Gaps::Places places;
+  if (has_several_places(pair.kind)) {
+    Gaps::Places places;
+    const int count = gaps.touches_of(pair, at, feet.beside, places);
+    for (int k = 0; k < count; ++k) add(places[static_cast<std::size_t>(k)], index, k, on, pose);
+    return;
+  }
   const std::size_t before = out_->count;
-  int count = gaps.evaluate(pair, at, feet.beside, places);
-  for (int k = 0; k < count; ++k) add(places[static_cast<std::size_t>(k)], index, k, on, pose);
+  if (const std::optional<Touch> touch = gaps.touch_of(pair, at, feet.beside)) add(*touch, index, 0, on, pose);
   if (out_->count > before && gaps.is_beyond_edge(pair, out_->found[before].touch.gap, at)) out_->count = before;
   if (out_->count > before || !pair.pressed || !(feet.over > beside_m)) return;
-  count = gaps.evaluate_over(pair, at, feet, places);
-  for (int k = 0; k < count; ++k) add(places[static_cast<std::size_t>(k)], index, k, on, pose);
+  const std::optional<Touch> over = gaps.touch_over(pair, at, feet);
+  if (over) add(*over, index, 0, on, pose);
   if (out_->count > before) out_->found[before].over = true;
 }
 
