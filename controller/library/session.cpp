@@ -14,9 +14,9 @@
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/preparation/zero_file.hpp"
 #include "controller/library/led_poses.hpp"
+#include "controller/library/paced_run.hpp"
 #include "controller/library/session_files.hpp"
 #include "controller/library/session_summary.hpp"
-#include "controller/report/latency.hpp"
 
 namespace proxarm {
 
@@ -67,12 +67,9 @@ class OneRun {
   controller::SummaryBuilder builder_;
   std::optional<controller::LedPoses> poses_;
   std::optional<command_line::ControlHandlers> handlers_;
-  controller::SessionTally tally_;
+  controller::PacedRun run_;
   std::int64_t rendered_ns_ = 0;
-  struct {
-    SteadyClock::duration figures{}, wall{};
-    controller::LatencyHistogram wake_up;
-  } took_;
+  SteadyClock::duration figures_{};  // time that the figures took
 };
 
 controller::Replay replay_of(const controller::OwnParts& own) {
@@ -102,17 +99,9 @@ OneRun::OneRun(const PreparedSession& session, const RunOptions& options, const 
 
 void OneRun::run(const LookAtRecord& each, const std::function<void()>& before) {
   const auto socket = command_line::control_socket(options_, *handlers_);
-  if (options_.pace == command_line::Pace::realtime) loop_.network().follow_real_time();
-  const SteadyClock::time_point begun = SteadyClock::now();
-  tally_ = loop_.run([&](const CycleRecord& record, const sim::Truth& truth) { look(record, truth, each); },
-                     controller::session_length(session_, options_),
-                     [&](std::int64_t) {
-                       took_.wake_up.add(loop_.network().woken_late_ns());
-                       if (loop_.exploded_after_s()) cycle().request_stop();
-                       before();
-                     });
-  took_.wall = SteadyClock::now() - begun;
-  if (loop_.exploded_after_s()) controller::refuse_explosion(*loop_.exploded_after_s());
+  run_ = controller::run_at_pace(
+      loop_, session_, options_, [&](const CycleRecord& record, const sim::Truth& truth) { look(record, truth, each); },
+      [&](std::int64_t) { before(); });
 }
 
 void OneRun::look(CycleRecord record, const sim::Truth& truth, const LookAtRecord& each) {
@@ -125,7 +114,7 @@ void OneRun::look(CycleRecord record, const sim::Truth& truth, const LookAtRecor
   builder_.add(record);
   if (poses_) poses_->add(record);
   files_.add(record);
-  took_.figures += SteadyClock::now() - completes;
+  figures_ += SteadyClock::now() - completes;
   if (each) each(record);
 }
 
@@ -138,18 +127,13 @@ void OneRun::place_contacts(CycleRecord& record) const {
 }
 
 Summary OneRun::summary() {
-  Summary summary = controller::session_summary(builder_, cycle(), tally_.end,
+  Summary summary = controller::session_summary(builder_, cycle(), run_.tally.end,
                                                 {.reason = "asked", .text = "by the program"}, session_);
   controller::add_idle_orders(summary, cycle(), options_);
   summary.expected_swing = command_line::slowest_swing(session_);
   if (poses_) summary.poses = poses_->summary();
-  summary.wall_time_s = std::chrono::duration<double>(took_.wall).count();
-  summary.figures_s = std::chrono::duration<double>(took_.figures).count();
-  summary.overruns = tally_.overruns;
-  summary.virtual_time = options_.pace != command_line::Pace::realtime;
-  if (!summary.virtual_time) summary.latency_us["wake_up"] = controller::latency_summary(took_.wake_up);
-  if (loop_.first_cycle_ns()) summary.first_cycle_s = 1e-9 * static_cast<double>(*loop_.first_cycle_ns());
-  summary.bus_load = loop_.bus_load();
+  summary.figures_s = std::chrono::duration<double>(figures_).count();
+  controller::add_figures(summary, run_, loop_, options_);
   files_.finish(summary);
   return summary;
 }

@@ -34,7 +34,6 @@ SessionFiles::SessionFiles(const command_line::PreparedSession& session, const c
       kept_replay_(replay),
       head_(replay_head(session, command_line::bus_names(session.cell), command_line::buses_in_order(session.cell))),
       deriver_(session.cell) {
-  require_plot_file(options.plot_file);
   if (!options.black_box_dir.empty()) SessionWriter(options.black_box_dir, {}, false);
   const bool draws = !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && draws) plot_ = std::make_unique<PlotBuilder>(plot_title(session));
@@ -70,8 +69,7 @@ void SessionFiles::finish(Summary& summary) {
 
 void SessionFiles::write_box(Summary& summary) const {
   const fs::path folder = black_box_folder(options_);
-  const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
-  if (folder.empty() || !ended_by_fault || box_.cycles() == 0) return;
+  if (folder.empty() || !summary.ended_by_fault() || box_.cycles() == 0) return;
   write_black_box(folder, box_, head_, session_, summary.faults.back().text, kept_replay_);
   summary.black_box = fs::absolute(folder).string();
 }

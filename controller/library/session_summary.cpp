@@ -1,5 +1,4 @@
 #include "controller/library/session_summary.hpp"
-#include "controller/command_line/preparation/session_loops.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,6 +6,7 @@
 
 #include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/live/orders.hpp"
+#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/signals/clearances.hpp"
 #include "fieldbus/cia402/cia402_bring_up.hpp"
 

@@ -102,13 +102,6 @@ command_line::PreparedSession simulated_arm(const command_line::PreparedSession&
 
 namespace {
 
-sim::SimulatedCellConfig config_of(const SimulatedFarEnd& far_end) {
-  sim::SimulatedCellConfig config;
-  config.faults = far_end.faults;
-  config.enabling = far_end.enabling;
-  return config;
-}
-
 const command_line::PreparedSession& arm_of(const SimulatedFarEnd& far_end,
                                             const command_line::PreparedSession& session) {
   return far_end.arm != nullptr ? *far_end.arm : session;
@@ -128,7 +121,7 @@ SimulatedLoop::SimulatedLoop(const command_line::PreparedSession& session, const
       own_(own),
       network_(sim::simulated_buses(arm_of(far_end, session).cell)),
       far_end_(arm_of(far_end, session).cell, arm_of(far_end, session).sensor, session.hand, network_.events(),
-               config_of(far_end)),
+               {.plant = {}, .faults = far_end.faults, .enabling = far_end.enabling}),
       scene_(scenes::compile(session.scene)) {
   if (own.world != nullptr) {
     require_own_world_fits(session);

@@ -228,8 +228,8 @@ void SummaryBuilder::State::count_limit(const std::string& parameter, RecordFlag
   limit.time_s += seconds(period_ns);
 }
 
-// Follows a mass, damping or spring that is set during rendering, or before its first cycle: it counts from then on, and
-// the last mass is the wanted one.
+// Follows a mass, damping or spring that is set during rendering, or before its first cycle: it counts from then on,
+// and the last mass is the wanted one.
 void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
   if (record.tool_mass_kg > 0.0 && config.handle_mass_kg > 0.0) config.handle_mass_kg = record.tool_mass_kg;
   if (record.proxy_mass_kg != mass_kg) {

@@ -173,6 +173,9 @@ struct PosesSummary {
 std::string poses_text(const UnstablePlaces& there);
 
 struct Summary {
+  // Whether a fault ended the session. Faults that were reset come first in the list.
+  [[nodiscard]] bool ended_by_fault() const noexcept { return !faults.empty() && !faults.back().was_reset; }
+
   double simulated_time_s = 0.0;  // over all cycles, in all phases
   double rendered_time_s = 0.0;
   double wall_time_s = 0.0;  // set by the caller

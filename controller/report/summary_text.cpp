@@ -390,7 +390,7 @@ void tell_everything(const Summary& s, Lines& line) {
 }  // namespace
 
 SummaryVerdict judge(const Summary& s) {
-  if (!s.faults.empty() && !s.faults.back().was_reset) {
+  if (s.ended_by_fault()) {
     return {VerdictTone::bad, "fault", std::string("a fault ended it: ") + fault_name(s.faults.back().fault)};
   }
   if (s.oscillation && s.oscillation->lasts) {

@@ -1,5 +1,4 @@
 #include "controller/command_line/live/session_status.hpp"
-#include "controller/command_line/preparation/session_loops.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/supervision/fault.hpp"
 #include "models/files/json.hpp"
 

@@ -256,8 +256,7 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
 
 int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   progress_.clear();
-  // Faults that were reset come first in the list, so the last fault tells whether a fault ended the session.
-  const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
+  const bool ended_by_fault = summary.ended_by_fault();
   if (options_.view_place) {
     summary.view = {options_.view_place->port, options_.view_place->most_viewers, options_.view_control};
   }

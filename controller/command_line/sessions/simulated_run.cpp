@@ -9,9 +9,7 @@
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/modbus_rates.hpp"
 #include "controller/library/black_box_files.hpp"
-#include "controller/library/session_summary.hpp"
-#include "controller/report/latency.hpp"
-#include "controller/session/session.hpp"
+#include "controller/library/paced_run.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -68,34 +66,18 @@ void SimulatedRun::keep_record() {
 
 int SimulatedRun::run_cycles() {
   Cycle& cycle = loop_.cycle();
-  fieldbus::SimulatedCanNetwork& network = loop_.network();
   cycle.write_to(keeper_.box());
   SignalWatch signals([&] { cycle.request_stop(); });
   output_.introduce();
   schedule_changes(cycle, session_, options_);
   const std::unique_ptr<ControlSocket> control =
       control_socket(options_, control_handlers(cycle, session_, options_, keeper_.box()));
-  const SteadyClock::time_point begun = SteadyClock::now();
-  controller::LatencyHistogram wake_up;
   Spectator spectator(options_.view && !options_.pace);
-  if (options_.pace == Pace::realtime) network.follow_real_time();  // from now on: earlier time belongs to no cycle
-  const controller::SessionTally tally =
-      loop_.run([this](const CycleRecord& record, const sim::Truth& truth) { drain(record, truth); },
-                controller::session_length(session_, options_),
-                [&, this](std::int64_t t_k_ns) {
-                  spectator.wait_for(t_k_ns);
-                  wake_up.add(network.woken_late_ns());
-                  if (loop_.exploded_after_s()) cycle.request_stop();
-                });
-  if (loop_.exploded_after_s()) controller::refuse_explosion(*loop_.exploded_after_s());
-  const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
-  controller::Summary summary = output_.summary(cycle, tally.end, signals.cause());
-  summary.wall_time_s = wall_s;
-  summary.overruns = tally.overruns;
-  summary.virtual_time = options_.pace != Pace::realtime;
-  if (loop_.first_cycle_ns()) summary.first_cycle_s = 1e-9 * static_cast<double>(*loop_.first_cycle_ns());
-  if (options_.pace == Pace::realtime) summary.latency_us["wake_up"] = controller::latency_summary(wake_up);
-  summary.bus_load = loop_.bus_load();
+  const controller::PacedRun run = controller::run_at_pace(
+      loop_, session_, options_, [this](const CycleRecord& record, const sim::Truth& truth) { drain(record, truth); },
+      [&](std::int64_t t_k_ns) { spectator.wait_for(t_k_ns); });
+  controller::Summary summary = output_.summary(cycle, run.tally.end, signals.cause());
+  controller::add_figures(summary, run, loop_, options_);
   if (replay_) replay_->finish();
   if (messages_) messages_->finish();
   return output_.finish(summary, keeper_);

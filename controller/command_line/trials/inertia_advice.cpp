@@ -1,8 +1,9 @@
 #include "controller/command_line/trials/inertia_advice.hpp"
-#include "controller/command_line/preparation/session_loops.hpp"
 
 #include <algorithm>
 #include <vector>
+
+#include "controller/command_line/preparation/session_loops.hpp"
 
 namespace proxarm::command_line {
 namespace {
