@@ -18,6 +18,7 @@ file(RENAME ${build}/models/base/libproxarm_models_base.a ${folder}/aside.a)
 execute_process(COMMAND ${CMAKE_COMMAND} --install ${build} --prefix ${folder}/half RESULT_VARIABLE status
                 OUTPUT_VARIABLE output ERROR_VARIABLE output)
 file(RENAME ${folder}/aside.a ${build}/models/base/libproxarm_models_base.a)
+string(REGEX REPLACE "[ \n]+" " " output "${output}")  # CMake wraps its messages, wherever the folder's name ends
 string(FIND "${output}" "libproxarm_models_base.a isn't built" said)
 if(status EQUAL 0 OR said EQUAL -1 OR EXISTS ${folder}/half)
   message(FATAL_ERROR "half a build was installed, or it wasn't said why not (${status}):\n${output}")
