@@ -31,6 +31,7 @@ using command_line::add_arm_option;
 using command_line::add_enabling_option;
 using command_line::add_fault_option;
 using command_line::add_hardware_option;
+using command_line::add_quantity;
 using command_line::add_run_options;
 using command_line::add_session_options;
 using command_line::add_turning_options;
@@ -38,7 +39,6 @@ using command_line::add_view_options;
 using command_line::add_without_enabling;
 using command_line::choice;
 using command_line::leave_out;
-using command_line::quantity;
 using command_line::RunOptions;
 using command_line::whole_number;
 
@@ -51,11 +51,9 @@ void add_check_options(CLI::App& app, scenes::CheckOptions& options) {
       ->type_name("NUMBER")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--depth",
-                 quantity([](const std::string& w) { return description::parse_length(w, "--depth"); },
-                          [&](double value) { options.deepest_m = value; }),
-                 "how deep states push (default 20mm), a tenth of the least radius at most: deeper in round things "
-                 "there are several solutions")
+  add_quantity(app, "--depth", description::parse_length, options.deepest_m,
+               "how deep states push (default 20mm), a tenth of the least radius at most: deeper in round things "
+               "there are several solutions")
       ->type_name("LENGTH");
 }
 
@@ -401,6 +399,7 @@ int run(int argc, char** argv) {
   app.formatter(std::make_shared<command_line::HelpFormatter>());
   app.set_help_all_flag("--help-all", "help of all commands");
   Commands commands(app);
+  command_line::refuse_options_as_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

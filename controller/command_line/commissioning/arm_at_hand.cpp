@@ -10,13 +10,6 @@
 namespace proxarm::command_line {
 namespace {
 
-sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
-  sim::SimulatedCellConfig config;
-  config.faults = options.faults;
-  config.enabling = options.enabling;
-  return config;
-}
-
 std::vector<std::string> apart(const PreparedSession& session, const RunOptions& options) {
   std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
@@ -34,7 +27,8 @@ description::HandDescription nobody() {
 SimulatedArm::SimulatedArm(const PreparedSession& arm, const RunOptions& options,
                            const description::HandDescription& hand)
     : network(sim::simulated_buses(arm.cell)),
-      far_end(arm.cell, arm.sensor, hand, network.events(), far_end_config(options)) {}
+      far_end(arm.cell, arm.sensor, hand, network.events(),
+              {.plant = {}, .faults = options.faults, .enabling = options.enabling}) {}
 
 void SimulatedArm::power_on() {
   far_end.attach_to(network);

@@ -34,4 +34,17 @@ CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_
   };
 }
 
+void refuse_options_as_values(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    if (!option->nonpositional() || option->get_items_expected_max() == 0) continue;
+    option->check([option](const std::string& value) -> std::string {
+      if (value.rfind("--", 0) != 0) return {};
+      throw description::SetupError({.key = option->get_name(),
+                                     .found = value + ", which is another option",
+                                     .expected = option->get_type_name()});
+    });
+  }
+  for (CLI::App* command : app.get_subcommands({})) refuse_options_as_values(*command);
+}
+
 }  // namespace proxarm::command_line

@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -15,7 +16,19 @@
 
 namespace proxarm::command_line {
 
-// Returns a parser of a number with its unit.
+// Adds an option that takes a quantity with its unit. `parse` reads its text, and names the option in errors.
+// Precondition: `target` outlives the parsing.
+template <typename Value, typename Target>
+CLI::Option* add_quantity(CLI::App& app, const char* name, Value (*parse)(std::string_view, std::string_view),
+                          Target& target, const char* help) {
+  const auto take = [name, parse, &target](const CLI::results_t& words) {
+    target = parse(words.back(), name);
+    return true;
+  };
+  return app.add_option(name, CLI::callback_t(take), help);
+}
+
+// Returns a callback that parses the option's text and stores the value.
 template <typename Parse, typename Store>
 CLI::callback_t quantity(Parse parse, Store store) {
   return [parse, store](const CLI::results_t& words) {
@@ -46,5 +59,9 @@ std::string options_mistake(const CLI::App& command, const std::vector<std::stri
 
 // Returns a parser of a whole number in decimal digits.
 CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_t)> store);
+
+// Refuses an option in the place of another one's value, in the app and its commands: in `--record --duration=1s` the
+// folder was left out. Call it after all options are added.
+void refuse_options_as_values(CLI::App& app);
 
 }  // namespace proxarm::command_line

@@ -33,6 +33,7 @@ int refuse_options(const CLI::App& command, const std::string& called, const std
 }
 
 std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv) {
+  refuse_options_as_values(app);
   try {
     app.parse(argc, argv);
     return std::nullopt;

@@ -24,10 +24,8 @@ void add_supervision_options(CLI::App& app, RunOptions& options) {
          "held: a hand or a load always acts on the handle, and no force is taken for the sensor's bias; the arm "
          "coasts when it is let go. auto (default): a handle that nobody holds is found out")
       ->type_name("auto|held");
-  app.add_option("--wait-after-fault",
-                 quantity([](const std::string& w) { return description::parse_duration(w, "--wait-after-fault"); },
-                          [&](double value) { options.settings.wait_after_fault_s = value; }),
-                 "after a stop by a fault, how long to wait for `proxarm reset` (default: the session ends)")
+  add_quantity(app, "--wait-after-fault", description::parse_duration, options.settings.wait_after_fault_s,
+               "after a stop by a fault, how long to wait for `proxarm reset` (default: the session ends)")
       ->type_name("TIME");
   app.add_option(
          "--accept-force",
@@ -40,19 +38,6 @@ void add_supervision_options(CLI::App& app, RunOptions& options) {
   add_hardware_option(app, options);
   app.add_flag("--without-proof", options.without_proof,
                "real drives of a cell that `proxarm prove` hasn't proven on them");
-}
-
-// Refuses an option in the place of a value: in `--record --duration=1s` the folder was left out.
-void refuse_options_as_values(CLI::App& app) {
-  for (CLI::Option* option : app.get_options()) {
-    if (option->get_items_expected_max() == 0) continue;
-    option->check([option](const std::string& value) -> std::string {
-      if (value.rfind("--", 0) != 0) return {};
-      throw description::SetupError({.key = option->get_name(),
-                                     .found = value + ", which is another option",
-                                     .expected = option->get_type_name()});
-    });
-  }
 }
 
 }  // namespace
@@ -127,7 +112,6 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_flag("--verbose", options.verbose, "print all figures, not the summary's eight lines");
   app.add_flag("--force-unstable", options.force_unstable,
                "simulation only: run with a mass that is predicted unstable");
-  refuse_options_as_values(app);
 }
 
 namespace {
@@ -137,7 +121,10 @@ struct Table {
   RunOptions options;
   CLI::App app{"", "run"};
 
-  Table() { add_run_options(app, options); }
+  Table() {
+    add_run_options(app, options);
+    refuse_options_as_values(app);
+  }
 };
 
 }  // namespace

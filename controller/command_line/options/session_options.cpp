@@ -18,26 +18,18 @@ void add_session_options(CLI::App& app, RunOptions& options) {
   app.add_option("--hand", options.hand,
                  "file of the simulated hand, such as sim/hands/touch.yaml (default: the cell's)")
       ->type_name("FILE");
-  app.add_option("--mass",
-                 quantity([](const std::string& w) { return description::parse_mass(w, "--mass"); },
-                          [&](double value) { options.mass_kg = value; }),
-                 "mass that the hand feels, in kg, handle included")
+  add_quantity(app, "--mass", description::parse_mass, options.mass_kg,
+               "mass that the hand feels, in kg, handle included")
       ->type_name("KG");
-  app.add_option("--damping",
-                 quantity([](const std::string& w) { return description::parse_damping(w, "--damping"); },
-                          [&](double value) { options.damping_Ns_per_m = value; }),
-                 "damping against the world, in Ns/m (default: the cell's, else 0); impedance: of the virtual coupling "
-                 "(default 8)")
+  add_quantity(app, "--damping", description::parse_damping, options.damping_Ns_per_m,
+               "damping against the world, in Ns/m (default: the cell's, else 0); impedance: of the virtual coupling "
+               "(default 8)")
       ->type_name("NS/M");
-  app.add_option("--spring",
-                 quantity([](const std::string& w) { return description::parse_stiffness(w, "--spring"); },
-                          [&](double value) { options.settings.spring_N_per_m = value; }),
-                 "spring to the start position, in N/m (default 0)")
+  add_quantity(app, "--spring", description::parse_stiffness, options.settings.spring_N_per_m,
+               "spring to the start position, in N/m (default 0)")
       ->type_name("N/M");
-  app.add_option("--stiffness",
-                 quantity([](const std::string& w) { return description::parse_stiffness(w, "--stiffness"); },
-                          [&](double value) { options.stiffness_N_per_m = value; }),
-                 "impedance: stiffness of the virtual coupling, in N/m (default 750)")
+  add_quantity(app, "--stiffness", description::parse_stiffness, options.stiffness_N_per_m,
+               "impedance: stiffness of the virtual coupling, in N/m (default 750)")
       ->type_name("N/M");
   using controller::Scheme;
   app.add_option(
@@ -47,22 +39,16 @@ void add_session_options(CLI::App& app, RunOptions& options) {
          "admittance: force in, positions out (drives in csp, ip or on Modbus); impedance: position in, torques "
          "out (drives in cst, a light device). Default: what the cell's drives take")
       ->type_name("admittance|impedance");
-  app.add_option("--timestep",
-                 quantity([](const std::string& w) { return description::parse_duration(w, "--timestep"); },
-                          [&](double value) { options.period_s = value; }),
-                 "timestep T with its unit: 1ms, 500us (default: the cell's)")
+  add_quantity(app, "--timestep", description::parse_duration, options.period_s,
+               "timestep T with its unit: 1ms, 500us (default: the cell's)")
       ->type_name("TIME");
-  app.add_option("--extra-delay",
-                 quantity([](const std::string& w) { return description::parse_duration(w, "--extra-delay"); },
-                          [&](double value) { options.extra_delay_s = value; }),
-                 "readings of the force sensor are this much older than the cell says, such as 8ms: simulated, and "
-                 "counted where stability is judged")
+  add_quantity(app, "--extra-delay", description::parse_duration, options.extra_delay_s,
+               "readings of the force sensor are this much older than the cell says, such as 8ms: simulated, and "
+               "counted where stability is judged")
       ->type_name("TIME");
-  app.add_option("--lookahead",
-                 quantity([](const std::string& w) { return LookaheadChoice::parse(w, "--lookahead"); },
-                          [&](LookaheadChoice value) { options.lookahead = value; }),
-                 "send the arm to where the proxy is going to be, which makes up for the loop's delay: off (default), "
-                 "auto, the horizon that is stable with margins for this mass, hand and cell, or a time, such as 8ms")
+  add_quantity(app, "--lookahead", LookaheadChoice::parse, options.lookahead,
+               "send the arm to where the proxy is going to be, which makes up for the loop's delay: off (default), "
+               "auto, the horizon that is stable with margins for this mass, hand and cell, or a time, such as 8ms")
       ->type_name("auto|off|TIME");
   app.add_option("--gear-damping",
                  choice<bool>("--gear-damping", {{"auto", true}, {"off", false}},
@@ -70,10 +56,8 @@ void add_session_options(CLI::App& app, RunOptions& options) {
                  "auto (default): where drives measure the torque of their gears, damp the arm's elastic modes by it, "
                  "as hard as is stable with margins; off: don't")
       ->type_name("auto|off");
-  app.add_option("--duration",
-                 quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
-                          [&](double value) { options.duration_s = value; }),
-                 "how long to render, with its unit (default 10s; at most a week)")
+  add_quantity(app, "--duration", description::parse_duration, options.duration_s,
+               "how long to render, with its unit (default 10s; at most a week)")
       ->type_name("TIME");
   app.add_option("--bus",
                  quantity([](const std::string& w) { return BusMapping::parse(w); },
@@ -96,24 +80,16 @@ void add_turning_options(CLI::App& app, RunOptions& options) {
          "file of the tool's shape, whose sides touch as well, such as scenes/tools/rod.yaml, or point (default: "
          "the scene's, else the cell's, else a point)")
       ->type_name("FILE|point");
-  app.add_option("--inertia",
-                 quantity([](const std::string& w) { return description::parse_inertia(w, "--inertia"); },
-                          [&](double value) { options.inertia_kg_m2 = value; }),
-                 "moment of inertia that the hand feels about each axis through the handle's point, in kg m², handle "
-                 "included; the tool turns under the hand's torque (default of a tool that turns: 0.05 more than the "
-                 "handle's)")
+  add_quantity(app, "--inertia", description::parse_inertia, options.inertia_kg_m2,
+               "moment of inertia that the hand feels about each axis through the handle's point, in kg m², handle "
+               "included; the tool turns under the hand's torque (default of a tool that turns: 0.05 more than the "
+               "handle's)")
       ->type_name("KGM2");
-  app.add_option(
-         "--turning-damping",
-         quantity([](const std::string& w) { return description::parse_turning_damping(w, "--turning-damping"); },
-                  [&](double value) { options.turning_damping_Nms_per_rad = value; }),
-         "damping of a tool that turns, in Nms/rad (default 0 with --inertia, else 0.5)")
+  add_quantity(app, "--turning-damping", description::parse_turning_damping, options.turning_damping_Nms_per_rad,
+               "damping of a tool that turns, in Nms/rad (default 0 with --inertia, else 0.5)")
       ->type_name("NMS/RAD");
-  app.add_option(
-         "--turning-spring",
-         quantity([](const std::string& w) { return description::parse_turning_stiffness(w, "--turning-spring"); },
-                  [&](double value) { options.turning_spring_Nm_per_rad = value; }),
-         "spring of a tool that turns to its orientation at the start, in Nm/rad (default 0)")
+  add_quantity(app, "--turning-spring", description::parse_turning_stiffness, options.turning_spring_Nm_per_rad,
+               "spring of a tool that turns to its orientation at the start, in Nm/rad (default 0)")
       ->type_name("NM/RAD");
 }
 
