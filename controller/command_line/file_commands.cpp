@@ -8,12 +8,12 @@
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/entry/exit_status.hpp"
-#include "controller/command_line/preparation/data_files.hpp"
-#include "controller/command_line/preparation/file_kind.hpp"
-#include "controller/command_line/preparation/prepared_session.hpp"
-#include "controller/command_line/preparation/start_check.hpp"
-#include "controller/command_line/trials/cycle_work.hpp"
+#include "controller/library/cycle_work.hpp"
 #include "controller/plausibility/doubts.hpp"
+#include "controller/preparation/data_files.hpp"
+#include "controller/preparation/file_kind.hpp"
+#include "controller/preparation/prepared_session.hpp"
+#include "controller/preparation/start_check.hpp"
 #include "controller/session/bring_up.hpp"
 #include "fieldbus/cia402/cia402_bring_up.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
@@ -113,7 +113,7 @@ void check_tool(const fs::path& file) {
 
 // Throws SetupError if the arm can't be simulated, for example because its gears are too stiff for the simulation's
 // step.
-void require_simulable(const PreparedSession& session) {
+void require_simulable(const controller::PreparedSession& session) {
   fieldbus::SimulatedCanNetwork network(sim::simulated_buses(session.cell));
   const sim::SimulatedCell far_end(session.cell, session.sensor, session.hand, network.events());
 }
@@ -134,12 +134,12 @@ void check_cell(const fs::path& file, const fs::path& scene) {
       const fieldbus::ModbusDrive modbus(drive, description::load_modbus_drive(drive.description), period_ns);
     }
   }
-  RunOptions run;
+  controller::RunOptions run;
   run.cell = file;
   run.scene = scene;
-  const PreparedSession session = prepare(run);
-  tell(surprises(session));
-  require_runnable(session, run);
+  const controller::PreparedSession session = controller::prepare(run);
+  tell(controller::surprises(session));
+  controller::require_runnable(session, run);
   require_simulable(session);
   std::vector<fieldbus::DriveSlot> slots;
   for (fieldbus::ServoDrive& servo : servos) slots.push_back({&servo, 0});
@@ -166,36 +166,36 @@ const char* tell_mesh(const fs::path& file) {
 }
 
 const char* check(const fs::path& file, const CheckFilesOptions& options) {
-  switch (kind_of(file)) {
-    case FileKind::cell:
+  switch (controller::kind_of(file)) {
+    case controller::FileKind::cell:
       check_cell(file, options.scene);
       return "cell";
-    case FileKind::registers:
+    case controller::FileKind::registers:
       tell(controller::register_doubts(description::load_modbus_drive(file)));
       return "register map of a Modbus drive";
-    case FileKind::eds:
+    case controller::FileKind::eds:
       tell(description::load_eds(file).remarks);
       return "description of a CANopen device";
-    case FileKind::dbc:
+    case controller::FileKind::dbc:
       tell(description::load_dbc(file).remarks);
       return "list of messages and signals";
-    case FileKind::sensor:
+    case controller::FileKind::sensor:
       description::load_sensor(file);
       tell_sources(file);
       return "sensor";
-    case FileKind::tool:
+    case controller::FileKind::tool:
       check_tool(file);
       return "tool";
-    case FileKind::hand:
+    case controller::FileKind::hand:
       tell(controller::hand_doubts(description::load_hand(file)));
       return "hand";
-    case FileKind::urdf:
+    case controller::FileKind::urdf:
       models::compile(models::load_urdf(file));
       return "arm";
-    case FileKind::mesh:
+    case controller::FileKind::mesh:
       return tell_mesh(file);
-    case FileKind::scene:
-    case FileKind::unknown:
+    case controller::FileKind::scene:
+    case controller::FileKind::unknown:
       return check_scene_file(scenes::load_scene(file), options.states);
   }
   return "";
@@ -207,7 +207,7 @@ int check_command(const CheckFilesOptions& options) {
   int status = 0;
   for (const fs::path& given : options.files) {
     try {
-      const char* kind = check(user_file(given), options);
+      const char* kind = check(controller::user_file(given), options);
       if (kind == kUntouched) {
         std::fprintf(stderr, "proxarm: %s: no verdict: no state touched anything; push deeper with --depth\n",
                      given.c_str());
@@ -233,12 +233,12 @@ namespace {
 // Describes what a cycle computes besides 𝒢, counted in a session of the default cell with this scene. If the cell
 // can't render the scene, returns the reason.
 std::string explain_cycle(const fs::path& scene) {
-  RunOptions options;
+  controller::RunOptions options;
   options.scene = scene;
   try {
-    const PreparedSession session = prepare(options);
-    require_runnable(session, options);
-    return work_text(session, count_work(session));
+    const controller::PreparedSession session = controller::prepare(options);
+    controller::require_runnable(session, options);
+    return controller::work_text(session, controller::count_work(session));
   } catch (const description::SetupError& error) {
     return std::string("a cycle around that wasn't counted, since the default cell doesn't render it: ") +
            error.what() + "\n";
@@ -249,8 +249,8 @@ std::string explain_cycle(const fs::path& scene) {
 
 int explain_command(const FileOptions& options) {
   for (const fs::path& given : options.files) {
-    const fs::path file = user_file(given);
-    require_kind(file, FileKind::scene);
+    const fs::path file = controller::user_file(given);
+    controller::require_kind(file, controller::FileKind::scene);
     const scenes::Scene scene = scenes::load_scene(file);
     const std::string of_step = scene.tool ? scenes::explain_rigid(scene) : scenes::explain(scene);
     std::printf("%s: %s%s", given.c_str(), of_step.c_str(), explain_cycle(file).c_str());

@@ -3,7 +3,7 @@
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/entry/exit_status.hpp"
-#include "controller/command_line/live/control_socket.hpp"
+#include "controller/live/control_socket.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
 
@@ -25,14 +25,14 @@ std::string line_of(const std::vector<std::string>& changes) {
 }  // namespace
 
 int set_command(const SetOptions& options) {
-  const std::filesystem::path path = options.control.empty() ? default_control_path() : options.control;
-  const std::string answer = ask_control_socket(path, line_of(options.changes));
-  if (!answer.starts_with(agreed)) {
+  const std::filesystem::path path = options.control.empty() ? controller::default_control_path() : options.control;
+  const std::string answer = controller::ask_control_socket(path, line_of(options.changes));
+  if (!answer.starts_with(controller::agreed)) {
     std::fprintf(stderr, "proxarm: %s%s\n", answer.c_str(),
                  options.changes.size() > 1 ? "; none of the changes was made" : "");
     return set_up_mistake;
   }
-  std::istringstream done(answer.substr(agreed.size()));
+  std::istringstream done(answer.substr(controller::agreed.size()));
   for (std::string change; std::getline(done, change, '\t');) std::printf("ok: %s\n", change.c_str());
   return fine;
 }

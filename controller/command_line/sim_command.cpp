@@ -3,11 +3,11 @@
 #include <memory>
 
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/live/signal_watch.hpp"
-#include "controller/command_line/preparation/cell_buses.hpp"
-#include "controller/command_line/preparation/prepared_session.hpp"
-#include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sim_view.hpp"
+#include "controller/live/signal_watch.hpp"
+#include "controller/preparation/cell_buses.hpp"
+#include "controller/preparation/prepared_session.hpp"
+#include "controller/preparation/start_check.hpp"
 #include "fieldbus/can/socket_can_network.hpp"
 #include "fieldbus/canopen/bus_leader.hpp"
 #include "models/base/setup_error.hpp"
@@ -20,7 +20,8 @@ namespace {
 
 // Returns the hand at the handle. For a proof, returns a hand without force, because a helper pushes as the proof asks
 // instead.
-description::HandDescription hand_of(const PreparedSession& session, const RunOptions& options) {
+description::HandDescription hand_of(const controller::PreparedSession& session,
+                                     const controller::RunOptions& options) {
   if (!options.for_proof) return session.hand;
   if (!options.hand.empty()) {
     throw description::SetupError({.key = "--for-proof",
@@ -51,24 +52,24 @@ void require_nobody_plays(const description::Cell& cell, fieldbus::CanNetwork& n
 }  // namespace
 
 // Runs until a signal comes, or until the reader of the output is gone.
-int sim_command(const RunOptions& options) {
+int sim_command(const controller::RunOptions& options) {
   if (options.bus.simulated()) {
     throw description::SetupError({.key = "--bus",
                                    .found = "sim",
                                    .expected = "the CAN interfaces on which the simulated arm answers",
                                    .advice = "for both in one process: proxarm run"});
   }
-  const PreparedSession session = prepare(options);
+  const controller::PreparedSession session = controller::prepare(options);
   const description::HandDescription hand = hand_of(session, options);
-  require_enabling_switch(session, options);
-  require_view(options);
+  controller::require_enabling_switch(session, options);
+  controller::require_view(options);
   std::unique_ptr<SimView> view;
   if (options.view) view = std::make_unique<SimView>(session, options);
   std::atomic<bool> stop{false};
-  const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
-  require_nodes_apart(session, interfaces);
+  const std::vector<std::string> interfaces = options.bus.interfaces(controller::bus_names(session.cell));
+  controller::require_nodes_apart(session, interfaces);
   fieldbus::SocketCanNetwork network(interfaces, {.closed = true});
-  require_fd(session.cell, network);
+  controller::require_fd(session.cell, network);
   std::vector<std::size_t> interface_of_bus;
   for (std::size_t i = 0; i < interfaces.size(); ++i) interface_of_bus.push_back(network.bus_of(i));
   sim::set_acceptance_filters(network, session.cell, session.sensor, interface_of_bus);
@@ -83,7 +84,7 @@ int sim_command(const RunOptions& options) {
     servers.push_back(std::make_unique<sim::ModbusServer>(line, process.cell().modbus_devices(line.name)));
   }
   if (view) view->watch(process.cell());
-  SignalWatch signals([&] { stop.store(true); });
+  controller::SignalWatch signals([&] { stop.store(true); });
   std::fprintf(stderr, "proxarm sim: %s on the wire; Ctrl-C ends it\n", session.cell.name.c_str());
   process.run(stop);
   const sim::FarEndStatistics statistics = process.statistics();

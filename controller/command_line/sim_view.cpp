@@ -15,7 +15,7 @@ controller::Phase phase_of(const sim::Plant& plant) noexcept {
 
 }  // namespace
 
-SimView::SimView(const PreparedSession& session, const RunOptions& options)
+SimView::SimView(const controller::PreparedSession& session, const controller::RunOptions& options)
     : box_(1e-9 * static_cast<double>(period_ns), 1, controller::BlackBox::Memory::by_descriptor),
       process_(session, options, box_.descriptor(), ViewProcess::Shows::simulated_arm) {}
 

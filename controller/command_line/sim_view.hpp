@@ -5,8 +5,8 @@
 
 #include <cstdint>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/sessions/view_process.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "controller/record/black_box.hpp"
 #include "sim/cell/simulated_cell.hpp"
 
@@ -15,7 +15,7 @@ namespace proxarm::command_line {
 class SimView {
  public:
   // Starts the process that shows the arm. Precondition: no other thread runs yet. Throws SetupError.
-  SimView(const PreparedSession& session, const RunOptions& options);
+  SimView(const controller::PreparedSession& session, const controller::RunOptions& options);
 
   // Shows this arm's state once a millisecond from now on. Precondition: `cell` doesn't move after this view is
   // destroyed.

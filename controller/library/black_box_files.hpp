@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "controller/record/black_box.hpp"
 #include "controller/record/replay_log.hpp"
 #include "controller/session/bring_up.hpp"
@@ -21,22 +21,22 @@ struct BoxSize {
   std::size_t frames_per_cycle;
 };
 // If the timestep may change, the box has room for cycles down to 1 ms.
-BoxSize box_size(const command_line::PreparedSession& session, bool timestep_may_change);
+BoxSize box_size(const controller::PreparedSession& session, bool timestep_may_change);
 
 // The folder of --black-box, else one in the folder of --record; empty: neither is given.
-std::filesystem::path black_box_folder(const command_line::RunOptions& options);
+std::filesystem::path black_box_folder(const controller::RunOptions& options);
 
 // Returns the head of the session's replay; its first cycle and state aren't filled in. Throws SetupError.
-ReplayHead replay_head(const command_line::PreparedSession& session, const std::vector<std::string>& bus_names,
+ReplayHead replay_head(const controller::PreparedSession& session, const std::vector<std::string>& bus_names,
                        const BusIndices& indices);
 // Returns all files from which the session was prepared.
-std::vector<std::filesystem::path> replay_files(const command_line::PreparedSession& session);
+std::vector<std::filesystem::path> replay_files(const controller::PreparedSession& session);
 
 enum class Replay : std::uint8_t { none, kept };
 
 // Writes the last seconds of the session to `folder`. Throws SetupError.
 void write_black_box(const std::filesystem::path& folder, const BlackBox& box, const ReplayHead& head,
-                     const command_line::PreparedSession& session, const std::string& reason,
+                     const controller::PreparedSession& session, const std::string& reason,
                      Replay replay = Replay::kept);
 
 }  // namespace proxarm::controller

@@ -2,17 +2,17 @@
 
 #include <algorithm>
 
-#include "controller/command_line/preparation/session_loops.hpp"
+#include "controller/preparation/session_loops.hpp"
 
 namespace proxarm::controller {
 
-LedPoses::LedPoses(const command_line::PreparedSession& session, const command_line::RunOptions& options,
+LedPoses::LedPoses(const controller::PreparedSession& session, const controller::RunOptions& options,
                    const SignalDeriver& deriver)
     : session_(session),
       options_(options),
       deriver_(deriver),
-      watch_(PassedPoses(deriver.arm(), session.cell, command_line::hand_model(session), session.loop,
-                         command_line::turned_model(session))),
+      watch_(PassedPoses(deriver.arm(), session.cell, controller::hand_model(session), session.loop,
+                         controller::turned_model(session))),
       loop_(session.loop) {
   if (options.view_place || !options.record_dir.empty()) watch_.find_smallest();
 }
@@ -27,7 +27,7 @@ void LedPoses::follow_timestep(const CycleRecord& record) {
   const bool refused = record.refused_period_ns > 0;
   if (refused || record.has(RecordFlag::timestep) || record.period_ns == period_ns_) return;
   if (period_ns_ > 0) {
-    loop_ = command_line::with_timestep(session_, options_, 1e-9 * static_cast<double>(record.period_ns)).loop;
+    loop_ = controller::with_timestep(session_, options_, 1e-9 * static_cast<double>(record.period_ns)).loop;
     watch_.change(judged_loop());
   }
   period_ns_ = record.period_ns;

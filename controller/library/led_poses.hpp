@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/library/pose_watch.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "controller/record/cycle_record.hpp"
 #include "controller/signals/derived_signals.hpp"
 
@@ -15,7 +15,7 @@ namespace proxarm::controller {
 class LedPoses {
  public:
   // Precondition: all arguments outlive this object.
-  LedPoses(const command_line::PreparedSession& session, const command_line::RunOptions& options,
+  LedPoses(const controller::PreparedSession& session, const controller::RunOptions& options,
            const SignalDeriver& deriver);
 
   // Takes every record, in order.
@@ -33,8 +33,8 @@ class LedPoses {
   void pass(const CycleRecord& record);
   [[nodiscard]] LoopModel judged_loop() const;
 
-  const command_line::PreparedSession& session_;
-  const command_line::RunOptions& options_;
+  const controller::PreparedSession& session_;
+  const controller::RunOptions& options_;
   const SignalDeriver& deriver_;
   PoseWatch watch_;
   LoopModel loop_;  // of the present timestep, with samples in time

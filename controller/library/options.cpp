@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "controller/command_line/options/run_words.hpp"
+#include "controller/options/run_words.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm {
@@ -80,17 +80,17 @@ void add_words(std::vector<std::string>& words, const std::string& option, const
 
 OptionValue::OptionValue(double number) : kind_(Kind::number), texts_{description::number_text(number)} {}
 
-command_line::RunOptions run_options(const SessionOptions& options) {
+controller::RunOptions run_options(const SessionOptions& options) {
   std::vector<std::string> words, cell;
   for (const SessionOption& given : options) {
     if (given.value.is_off()) continue;
     const std::string option = option_of(given.name);
     refuse_what_is_the_programs(option, given.value);
-    const std::string type = command_line::run_option_type(option).value_or("unknown");
+    const std::string type = controller::run_option_type(option).value_or("unknown");
     add_words(option == "cell" ? cell : words, option, given.value, type);
   }
   words.insert(words.end(), cell.begin(), cell.end());
-  return command_line::run_options(words);
+  return controller::run_options(words);
 }
 
 }  // namespace proxarm

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "controller/command_line/preparation/run_options.hpp"
+#include "controller/preparation/run_options.hpp"
 
 namespace proxarm {
 
@@ -65,6 +65,6 @@ class SessionOptions {
 
 // Returns what the command line makes of these options. Throws SetupError with the command line's words, also for
 // options of the program alone: a real arm, the view, and what is printed.
-command_line::RunOptions run_options(const SessionOptions& options);
+controller::RunOptions run_options(const SessionOptions& options);
 
 }  // namespace proxarm

@@ -9,12 +9,12 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-bool is_realtime(const command_line::RunOptions& options) { return options.pace == command_line::Pace::realtime; }
+bool is_realtime(const controller::RunOptions& options) { return options.pace == controller::Pace::realtime; }
 
 }  // namespace
 
-PacedRun run_at_pace(SimulatedLoop& loop, const command_line::PreparedSession& session,
-                     const command_line::RunOptions& options, const LookAtCycle& look,
+PacedRun run_at_pace(SimulatedLoop& loop, const controller::PreparedSession& session,
+                     const controller::RunOptions& options, const LookAtCycle& look,
                      const std::function<void(std::int64_t t_k_ns)>& before) {
   PacedRun run;
   const SteadyClock::time_point begun = SteadyClock::now();
@@ -30,7 +30,7 @@ PacedRun run_at_pace(SimulatedLoop& loop, const command_line::PreparedSession& s
 }
 
 void add_figures(Summary& summary, const PacedRun& run, const SimulatedLoop& loop,
-                 const command_line::RunOptions& options) {
+                 const controller::RunOptions& options) {
   summary.wall_time_s = run.wall_s;
   summary.overruns = run.tally.overruns;
   summary.virtual_time = !is_realtime(options);

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "controller/command_line/preparation/run_options.hpp"
 #include "controller/library/simulated_loop.hpp"
+#include "controller/preparation/run_options.hpp"
 #include "controller/report/latency.hpp"
 #include "controller/report/summary.hpp"
 
@@ -20,12 +20,12 @@ struct PacedRun {
 
 // Precondition: loop.start() was called. `look` sees each cycle's record; `before` is called before each cycle, at its
 // time. Throws SetupError if the simulation has become unstable.
-PacedRun run_at_pace(SimulatedLoop& loop, const command_line::PreparedSession& session,
-                     const command_line::RunOptions& options, const LookAtCycle& look,
+PacedRun run_at_pace(SimulatedLoop& loop, const controller::PreparedSession& session,
+                     const controller::RunOptions& options, const LookAtCycle& look,
                      const std::function<void(std::int64_t t_k_ns)>& before);
 
 // Adds the figures of the run's time and of the buses to a session's summary.
 void add_figures(Summary& summary, const PacedRun& run, const SimulatedLoop& loop,
-                 const command_line::RunOptions& options);
+                 const controller::RunOptions& options);
 
 }  // namespace proxarm::controller

@@ -3,16 +3,16 @@
 
 #include <filesystem>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
-#include "controller/view/messages/mcap_record.hpp"
-#include "controller/view/stage/stage.hpp"
+#include "controller/messages/mcap_record.hpp"
+#include "controller/preparation/prepared_session.hpp"
+#include "controller/stage/stage.hpp"
 
 namespace proxarm::controller {
 
 class RecordedMessages {
  public:
   // Creates the file. Throws SetupError.
-  RecordedMessages(const std::filesystem::path& folder, const command_line::PreparedSession& session);
+  RecordedMessages(const std::filesystem::path& folder, const controller::PreparedSession& session);
   // Writes a cycle. Precondition: the record is complete, as SessionOutput::add() returns it.
   void add(const CycleRecord& completed) { record_.add(completed); }
   void drain(const BoxReader& box) { record_.drain(box); }

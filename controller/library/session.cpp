@@ -8,20 +8,20 @@
 #include <optional>
 #include <utility>
 
-#include "controller/command_line/live/live_parameters.hpp"
-#include "controller/command_line/preparation/data_files.hpp"
-#include "controller/command_line/preparation/session_loops.hpp"
-#include "controller/command_line/preparation/start_check.hpp"
-#include "controller/command_line/preparation/zero_file.hpp"
 #include "controller/library/led_poses.hpp"
 #include "controller/library/paced_run.hpp"
 #include "controller/library/session_files.hpp"
 #include "controller/library/session_summary.hpp"
+#include "controller/live/live_parameters.hpp"
+#include "controller/preparation/data_files.hpp"
+#include "controller/preparation/session_loops.hpp"
+#include "controller/preparation/start_check.hpp"
+#include "controller/preparation/zero_file.hpp"
 
 namespace proxarm {
 
-using command_line::PreparedSession;
-using command_line::RunOptions;
+using controller::PreparedSession;
+using controller::RunOptions;
 
 namespace {
 
@@ -29,10 +29,10 @@ using SteadyClock = std::chrono::steady_clock;
 using LookAtRecord = std::function<void(const CycleRecord&)>;
 
 PreparedSession prepared_session(const RunOptions& options) {
-  PreparedSession session = command_line::prepare(options);
-  if (const auto kept = command_line::kept_zero(session, false)) session.settings.zero_S_N = kept->force_S_N;
-  command_line::require_runnable(session, options);
-  command_line::require_changes(session, options);
+  PreparedSession session = controller::prepare(options);
+  if (const auto kept = controller::kept_zero(session, false)) session.settings.zero_S_N = kept->force_S_N;
+  controller::require_runnable(session, options);
+  controller::require_changes(session, options);
   controller::require_plot_file(options.plot_file);
   return session;
 }
@@ -51,7 +51,7 @@ class OneRun {
   [[nodiscard]] Summary summary();
 
   [[nodiscard]] controller::Cycle& cycle() noexcept { return loop_.cycle(); }
-  [[nodiscard]] const command_line::ControlHandlers& handlers() const noexcept { return *handlers_; }
+  [[nodiscard]] const controller::ControlHandlers& handlers() const noexcept { return *handlers_; }
 
  private:
   void look(CycleRecord record, const sim::Truth& truth, const LookAtRecord& each);
@@ -66,7 +66,7 @@ class OneRun {
   controller::SessionFiles files_;
   controller::SummaryBuilder builder_;
   std::optional<controller::LedPoses> poses_;
-  std::optional<command_line::ControlHandlers> handlers_;
+  std::optional<controller::ControlHandlers> handlers_;
   controller::PacedRun run_;
   std::int64_t rendered_ns_ = 0;
   SteadyClock::duration figures_{};  // time that the figures took
@@ -93,12 +93,12 @@ OneRun::OneRun(const PreparedSession& session, const RunOptions& options, const 
   }
   loop_.start();
   cycle().write_to(box_);
-  command_line::schedule_changes(cycle(), session, options);
-  handlers_ = command_line::control_handlers(cycle(), session, options, box_);
+  controller::schedule_changes(cycle(), session, options);
+  handlers_ = controller::control_handlers(cycle(), session, options, box_);
 }
 
 void OneRun::run(const LookAtRecord& each, const std::function<void()>& before) {
-  const auto socket = command_line::control_socket(options_, *handlers_);
+  const auto socket = controller::control_socket(options_, *handlers_);
   run_ = controller::run_at_pace(
       loop_, session_, options_, [&](const CycleRecord& record, const sim::Truth& truth) { look(record, truth, each); },
       [&](std::int64_t) { before(); });
@@ -130,7 +130,7 @@ Summary OneRun::summary() {
   Summary summary = controller::session_summary(builder_, cycle(), run_.tally.end,
                                                 {.reason = "asked", .text = "by the program"}, session_);
   controller::add_idle_orders(summary, cycle(), options_);
-  summary.expected_swing = command_line::slowest_swing(session_);
+  summary.expected_swing = controller::slowest_swing(session_);
   if (poses_) summary.poses = poses_->summary();
   summary.figures_s = std::chrono::duration<double>(figures_).count();
   controller::add_figures(summary, run_, loop_, options_);
@@ -206,7 +206,7 @@ Session& Session::set_world(GeometricAlgorithm<3>& world) {
     throw SetupError({.key = "--scene", .found = "a world of one's own", .expected = "one of the two"});
   }
   // What the cell has as its scene isn't there then.
-  options.scene = command_line::shipped_file("scenes/free.yaml");
+  options.scene = controller::shipped_file("scenes/free.yaml");
   state_->session = prepared_session(options);
   state_->session.scene.name = "a world of one's own";
   state_->own.world = &world;
@@ -237,13 +237,13 @@ void Session::stop() noexcept { state_->stop_asked = true; }
 std::string Session::ask(const std::string& line) {
   const std::lock_guard<std::mutex> it_runs_on(state_->asking);
   if (state_->running == nullptr) refuse_asking(line);
-  const command_line::ControlHandlers& handlers = state_->running->handlers();
-  if (!line.starts_with("status")) command_line::require_changeable(state_->session, line);
+  const controller::ControlHandlers& handlers = state_->running->handlers();
+  if (!line.starts_with("status")) controller::require_changeable(state_->session, line);
   if (const std::optional<std::string> done = handlers.order(line)) return *done;
   return handlers.change(line);
 }
 
-std::vector<std::string> Session::surprises() const { return command_line::surprises(state_->session); }
+std::vector<std::string> Session::surprises() const { return controller::surprises(state_->session); }
 
 std::vector<std::string> Session::objects() const {
   if (const auto* const world = dynamic_cast<const OwnWorld*>(state_->own.world)) return world->objects();

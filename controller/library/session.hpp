@@ -73,7 +73,7 @@ class Session {
   [[nodiscard]] std::vector<std::string> surprises() const;
   // The names of the objects; records have their indices.
   [[nodiscard]] std::vector<std::string> objects() const;
-  [[nodiscard]] const command_line::PreparedSession& prepared() const noexcept;
+  [[nodiscard]] const controller::PreparedSession& prepared() const noexcept;
 
  private:
   struct State;

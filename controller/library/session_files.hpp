@@ -6,9 +6,9 @@
 #include <memory>
 #include <string_view>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/library/black_box_files.hpp"
 #include "controller/library/recorded_messages.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "controller/record/black_box.hpp"
 #include "controller/record/replay_log.hpp"
 #include "controller/report/plot.hpp"
@@ -25,8 +25,8 @@ class SessionFiles {
  public:
   // Makes the record's folder; throws SetupError. A session with its own world, sensor or drives has no replay, which
   // is computed from files alone. Precondition: session, options and box outlive this object.
-  SessionFiles(const command_line::PreparedSession& session, const command_line::RunOptions& options,
-               const BlackBox& box, Replay replay);
+  SessionFiles(const controller::PreparedSession& session, const controller::RunOptions& options, const BlackBox& box,
+               Replay replay);
 
   [[nodiscard]] const SignalDeriver& deriver() const noexcept { return deriver_; }
   [[nodiscard]] bool keeps_frames() const noexcept { return writer_ != nullptr; }
@@ -40,8 +40,8 @@ class SessionFiles {
   void write_box(Summary& summary) const;
   void draw(const Summary& summary) const;
 
-  const command_line::PreparedSession& session_;
-  const command_line::RunOptions& options_;
+  const controller::PreparedSession& session_;
+  const controller::RunOptions& options_;
   const BlackBox& box_;
   Replay kept_replay_;
   ReplayHead head_;

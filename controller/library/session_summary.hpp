@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/cycle/cycle.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "controller/record/cycle_record.hpp"
 #include "controller/report/summary.hpp"
 #include "controller/session/session.hpp"
@@ -15,23 +15,23 @@
 namespace proxarm::controller {
 
 std::vector<std::string> joint_names(const description::Cell& cell);
-SummaryConfig summary_config(const command_line::PreparedSession& session);
+SummaryConfig summary_config(const controller::PreparedSession& session);
 // Fills in what only the scene knows, distances and friction, after so much rendering.
-void complete(CycleRecord& record, const command_line::PreparedSession& session, std::int64_t rendered_ns);
+void complete(CycleRecord& record, const controller::PreparedSession& session, std::int64_t rendered_ns);
 
 // Returns the session's length. If no person can end a release, the length also has the longest time of a release.
-SessionLength session_length(const command_line::PreparedSession& session, const command_line::RunOptions& options);
+SessionLength session_length(const controller::PreparedSession& session, const controller::RunOptions& options);
 
 // What is rendered, in a few words: "4 kg felt"; and with scene and timestep, above a plot.
-std::string rendered_text(const command_line::PreparedSession& session);
-std::string plot_title(const command_line::PreparedSession& session);
+std::string rendered_text(const controller::PreparedSession& session);
+std::string plot_title(const controller::PreparedSession& session);
 
 // Of all that was added to `builder` and what the cycle found; the caller fills in what only it knows. `asked`: who
 // asked for the end, of SessionEnd::asked.
 Summary session_summary(SummaryBuilder& builder, const Cycle& cycle, SessionEnd end, const EndSummary& asked,
-                        const command_line::PreparedSession& session);
+                        const controller::PreparedSession& session);
 
 // What the session's script said and didn't come to pass.
-void add_idle_orders(Summary& summary, const Cycle& cycle, const command_line::RunOptions& options);
+void add_idle_orders(Summary& summary, const Cycle& cycle, const controller::RunOptions& options);
 
 }  // namespace proxarm::controller

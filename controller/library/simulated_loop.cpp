@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/preparation/cell_buses.hpp"
 #include "controller/session/bring_up.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -55,7 +55,7 @@ void require_joints(const OwnParts& own, const description::Cell& cell) {
   }
 }
 
-void require_replaceable(const command_line::PreparedSession& session, std::size_t axis) {
+void require_replaceable(const controller::PreparedSession& session, std::size_t axis) {
   const description::DriveDescription& drive = session.cell.drives[axis];
   if (drive.on_can() && !session.impedance()) return;
   throw SetupError({.file = session.cell.file.string(),
@@ -66,7 +66,7 @@ void require_replaceable(const command_line::PreparedSession& session, std::size
 
 }  // namespace
 
-void require_own_world_fits(const command_line::PreparedSession& session) {
+void require_own_world_fits(const controller::PreparedSession& session) {
   if (session.settings.looks_ahead) {
     throw SetupError({.key = "--lookahead", .found = "a world of one's own", .expected = "off with it"});
   }
@@ -81,12 +81,12 @@ void require_own_world_fits(const command_line::PreparedSession& session) {
                     .expected = "an arm whose tool moves in space"});
 }
 
-command_line::PreparedSession simulated_arm(const command_line::PreparedSession& session,
-                                            const command_line::RunOptions& options) {
+controller::PreparedSession simulated_arm(const controller::PreparedSession& session,
+                                          const controller::RunOptions& options) {
   if (options.arm.empty()) return session;
-  command_line::RunOptions of_arm = options;
+  controller::RunOptions of_arm = options;
   of_arm.cell = options.arm;
-  command_line::PreparedSession arm = command_line::prepare(of_arm);
+  controller::PreparedSession arm = controller::prepare(of_arm);
   const auto names = [](const description::Cell& cell) {
     std::string all;
     for (const auto& bus : cell.buses) all += bus.name + " ";
@@ -102,8 +102,7 @@ command_line::PreparedSession simulated_arm(const command_line::PreparedSession&
 
 namespace {
 
-const command_line::PreparedSession& arm_of(const SimulatedFarEnd& far_end,
-                                            const command_line::PreparedSession& session) {
+const controller::PreparedSession& arm_of(const SimulatedFarEnd& far_end, const controller::PreparedSession& session) {
   return far_end.arm != nullptr ? *far_end.arm : session;
 }
 
@@ -115,7 +114,7 @@ bool is_possible(const sim::Truth& truth) noexcept {
 
 }  // namespace
 
-SimulatedLoop::SimulatedLoop(const command_line::PreparedSession& session, const OwnParts& own,
+SimulatedLoop::SimulatedLoop(const controller::PreparedSession& session, const OwnParts& own,
                              const SimulatedFarEnd& far_end)
     : session_(session),
       own_(own),
@@ -135,7 +134,7 @@ void SimulatedLoop::start() {
     return far_end_.modbus_client(line.name);
   };
   CycleParts parts = build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_,
-                                 command_line::buses_in_order(session_.cell), open_line);
+                                 controller::buses_in_order(session_.cell), open_line);
   put_in(parts);
   far_end_.attach_to(network_);
   far_end_.power_on();
@@ -194,7 +193,7 @@ SessionTally SimulatedLoop::run(const LookAtCycle& look, const SessionLength& le
   return tally;
 }
 
-QuietEnd run_quietly(const command_line::PreparedSession& session, const LookAtCycle& look) {
+QuietEnd run_quietly(const controller::PreparedSession& session, const LookAtCycle& look) {
   SimulatedLoop loop(session);
   QuietEnd out;
   loop.start();

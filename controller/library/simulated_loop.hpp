@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/cycle/cycle.hpp"
 #include "controller/motion/motion_work.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "controller/record/cycle_record.hpp"
 #include "controller/session/session.hpp"
 #include "fieldbus/cia402/cyclic_drive.hpp"
@@ -49,26 +49,26 @@ struct OwnParts {
 
 // Throws SetupError for an arm whose tool can't move in space, for a tool with a shape, and for a lookahead: that steps
 // a second proxy through a scene which it compiles anew, and somebody's own 𝒢 is there only once.
-void require_own_world_fits(const command_line::PreparedSession& session);
+void require_own_world_fits(const controller::PreparedSession& session);
 
 // Sees each cycle's record, and the truth at its SYNC.
 using LookAtCycle = std::function<void(const CycleRecord&, const sim::Truth&)>;
 
 // What is simulated: the session's own cell, or that of --arm, which is wired as it is. Throws SetupError.
-command_line::PreparedSession simulated_arm(const command_line::PreparedSession& session,
-                                            const command_line::RunOptions& options);
+controller::PreparedSession simulated_arm(const controller::PreparedSession& session,
+                                          const controller::RunOptions& options);
 
 // The far end, where it isn't just what the session takes it for.
 struct SimulatedFarEnd {
-  const command_line::PreparedSession* arm = nullptr;  // simulated_arm(); null: the session
-  std::vector<sim::DeviceFault> faults;                // of its devices
-  std::vector<sim::PressedSpan> enabling;              // of its enabling switch
+  const controller::PreparedSession* arm = nullptr;  // simulated_arm(); null: the session
+  std::vector<sim::DeviceFault> faults;              // of its devices
+  std::vector<sim::PressedSpan> enabling;            // of its enabling switch
 };
 
 class SimulatedLoop {
  public:
   // Throws SetupError. `session` must outlive the loop. Several loops may run at once, in different threads.
-  explicit SimulatedLoop(const command_line::PreparedSession& session, const OwnParts& own = {},
+  explicit SimulatedLoop(const controller::PreparedSession& session, const OwnParts& own = {},
                          const SimulatedFarEnd& far_end = {});
   SimulatedLoop(const SimulatedLoop&) = delete;
   SimulatedLoop& operator=(const SimulatedLoop&) = delete;
@@ -95,7 +95,7 @@ class SimulatedLoop {
   void put_in(CycleParts& parts);
   void look_at_truth(std::int64_t t_k_ns);
 
-  const command_line::PreparedSession& session_;
+  const controller::PreparedSession& session_;
   OwnParts own_;
   fieldbus::SimulatedCanNetwork network_;
   sim::SimulatedCell far_end_;
@@ -114,7 +114,7 @@ struct QuietEnd {
   std::string fault;  // its name; empty: none
   MotionWork work;    // all zero where nothing is counted
 };
-QuietEnd run_quietly(const command_line::PreparedSession& session, const LookAtCycle& look);
+QuietEnd run_quietly(const controller::PreparedSession& session, const LookAtCycle& look);
 
 // Fills in what only the simulation knows.
 void add_truth(CycleRecord& record, const sim::Truth& truth);

@@ -40,8 +40,8 @@ bool is_folder(const fs::path& path) {
   return fs::symlink_status(path, error).type() == fs::file_type::directory;
 }
 
-// Returns whether this folder is the Python package's cache of signals.csv (controller/python/proxarm), with a file per
-// column.
+// Returns whether this folder is the Python package's cache of signals.csv (controller/extras/python/proxarm), with a
+// file per column.
 bool is_kept_columns(const fs::path& path) {
   std::error_code error;
   return is_folder(path) && std::all_of(fs::directory_iterator(path, error), {}, [](const fs::directory_entry& entry) {

@@ -3,8 +3,8 @@
 // `proxarm sim` doesn't know what the controller asks the person to do, so the helper watches the arm. In a proof, the
 // arm stands longer than at any other time when it waits for a push. Whenever all drives are enabled and the arm has
 // stood for wait_ns, the helper leans on the handle for lean_ns. The pushes are along x, y and then x of W
-// (controller/proof/proof.hpp, Station). If a drive goes off, the helper lets go; in the next proof it begins again
-// with the first push. In a session without a proof, the pushes come at wrong times.
+// (controller/extras/proof/proof.hpp, Station). If a drive goes off, the helper lets go; in the next proof it begins
+// again with the first push. In a session without a proof, the pushes come at wrong times.
 #pragma once
 
 #include <cstdint>

@@ -29,8 +29,8 @@
 #include <btBulletDynamicsCommon.h>
 #endif
 
+#include "controller/extras/studies/error/error_cases.hpp"
 #include "controller/proxies/admittance_proxy.hpp"
-#include "controller/studies/error/error_cases.hpp"
 
 namespace proxarm {
 namespace {

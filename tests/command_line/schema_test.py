@@ -15,9 +15,9 @@ import jsonschema
 import yaml
 from harness import SOURCE, ProgramTest
 
-KINDS = {"cell": ["models/cells", "schema/specimens/cell"], "hand": ["sim/hands", "schema/specimens/hand"],
-         "scene": ["scenes", "schema/specimens/scene"], "sensor": ["models/sensors", "schema/specimens/sensor"],
-         "tool": ["scenes/tools", "schema/specimens/tool"], "drive": ["models/drives", "schema/specimens/drive"]}
+KINDS = {"cell": ["models/cells", "models/schema/specimens/cell"], "hand": ["sim/hands", "models/schema/specimens/hand"],
+         "scene": ["scenes", "models/schema/specimens/scene"], "sensor": ["models/sensors", "models/schema/specimens/sensor"],
+         "tool": ["scenes/tools", "models/schema/specimens/tool"], "drive": ["models/drives", "models/schema/specimens/drive"]}
 MUTATIONS = int(os.environ.get("PROXARM_MUTATIONS", "400"))  # of each kind
 SEED = int(os.environ.get("PROXARM_SEED", "19"))
 
@@ -70,7 +70,7 @@ def load(text):
 
 
 def schema(kind):
-    return json.loads((SOURCE / f"schema/{kind}.json").read_text())
+    return json.loads((SOURCE / f"models/schema/{kind}.json").read_text())
 
 
 def places(value, path=()):
@@ -135,7 +135,7 @@ class Schema(ProgramTest):
     def tree(self):
         root = self.folder / "tree"
         if not root.exists():
-            for part in ("models", "scenes", "sim/hands", "schema"):
+            for part in ("models", "scenes", "sim/hands"):
                 shutil.copytree(SOURCE / part, root / part, ignore=shutil.ignore_patterns("*.cpp", "*.hpp"))
         return root
 
@@ -156,9 +156,9 @@ class Schema(ProgramTest):
         page = (SOURCE / "docs/keys.md").read_text()
         for kind in KINDS:
             with self.subTest(kind=kind):
-                self.assertEqual(self.call("schema", kind).out, (SOURCE / f"schema/{kind}.json").read_text(),
-                                 "schema/make writes it anew")
-                self.assertIn(self.call("schema", kind, "--markdown").out, page, "schema/make writes it anew")
+                self.assertEqual(self.call("schema", kind).out, (SOURCE / f"models/schema/{kind}.json").read_text(),
+                                 "models/schema/make writes it anew")
+                self.assertIn(self.call("schema", kind, "--markdown").out, page, "models/schema/make writes it anew")
                 jsonschema.Draft202012Validator.check_schema(schema(kind))
 
     def test_arguments_are_refused_clearly(self):

@@ -38,7 +38,7 @@ foreach(file IN LISTS rest ITEMS share/man/man1/proxarm.1.gz share/man/man1/prox
 endforeach()
 
 # Files of the view's page, cells, scenes and hands: each must be installed, whatever its extension.
-file(GLOB_RECURSE shipped RELATIVE ${source} ${source}/controller/view/page/* ${source}/models/cells/*.yaml
+file(GLOB_RECURSE shipped RELATIVE ${source} ${source}/controller/extras/view/page/* ${source}/models/cells/*.yaml
      ${source}/scenes/*.yaml ${source}/scenes/meshes/* ${source}/sim/hands/*.yaml)
 list(FILTER shipped INCLUDE REGEX "\\.[a-z]+$")
 foreach(file IN LISTS shipped)

@@ -83,7 +83,7 @@ def main():
         told("328 048 triangles, again", old, 3)
         print(f"pictures a second: {pictures_a_second(browser, Session, folder):.0f} (at least 30)")
     three = pathlib.Path("/usr/share/javascript/three")
-    files = [*(ROOT / "controller/view/page").iterdir(), three / "build/three.module.js",
+    files = [*(ROOT / "controller/extras/view/page").iterdir(), three / "build/three.module.js",
              three / "examples/jsm/controls/OrbitControls.js"]
     print(f"page: {sum(len(gzip.compress(file.read_bytes())) for file in files) / 1e6:.2f} MB (at most 1 MB)")
     for process in busy:

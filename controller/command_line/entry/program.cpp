@@ -6,8 +6,8 @@
 #include <new>
 
 #include "controller/command_line/entry/exit_status.hpp"
-#include "controller/command_line/entry/options.hpp"
 #include "controller/command_line/entry/standard_streams.hpp"
+#include "controller/options/parsing/option_parsing.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -28,12 +28,13 @@ int run_program(const std::function<int()>& run) noexcept {
 
 int refuse_options(const CLI::App& command, const std::string& called, const std::vector<std::string>& words,
                    const CLI::ParseError& error) {
-  std::fprintf(stderr, "proxarm: %s; see %s --help\n", options_mistake(command, words, error).c_str(), called.c_str());
+  std::fprintf(stderr, "proxarm: %s; see %s --help\n", controller::options_mistake(command, words, error).c_str(),
+               called.c_str());
   return set_up_mistake;
 }
 
 std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv) {
-  refuse_options_as_values(app);
+  controller::refuse_options_as_values(app);
   try {
     app.parse(argc, argv);
     return std::nullopt;

@@ -12,8 +12,8 @@
 #include <cstring>
 #include <new>
 
-#include "controller/command_line/live/signal_watch.hpp"
 #include "controller/library/black_box_files.hpp"
+#include "controller/live/signal_watch.hpp"
 #include "controller/report/session_record.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -23,13 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path folder_for(const RunOptions& options) {
+fs::path folder_for(const controller::RunOptions& options) {
   const fs::path folder = controller::black_box_folder(options);
   return folder.empty() ? "proxarm-black-box" : folder;
 }
 
 // The size of the session's box.
-controller::BoxSize size_for(const PreparedSession& session, const RunOptions& options) {
+controller::BoxSize size_for(const controller::PreparedSession& session, const controller::RunOptions& options) {
   return controller::box_size(session, !options.control.empty() || !options.changes.empty());
 }
 
@@ -48,7 +48,7 @@ namespace {
 }
 }  // namespace
 
-BlackBoxKeeper::BlackBoxKeeper(const PreparedSession& session, const RunOptions& options)
+BlackBoxKeeper::BlackBoxKeeper(const controller::PreparedSession& session, const controller::RunOptions& options)
     : session_(session),
       folder_(fs::absolute(folder_for(options))),
       box_(size_for(session, options).period_s, size_for(session, options).frames_per_cycle,
@@ -96,7 +96,7 @@ bool BlackBoxKeeper::finish(const std::string& reason) {
 // Waits for the session's end, and writes the box if necessary. Runs in the keeper's process.
 void BlackBoxKeeper::keep(int said) {
   prctl(PR_SET_NAME, "proxarm-box");
-  ignore_ending_signals();
+  controller::ignore_ending_signals();
   char word = 0;
   ssize_t got = 0;
   do {

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <string>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "controller/record/black_box.hpp"
 #include "controller/record/replay_log.hpp"
 
@@ -19,7 +19,7 @@ class BlackBoxKeeper {
  public:
   // Preconditions: `session` and `options` outlive this object; no other thread runs yet. Throws SetupError if
   // --black-box names an unusable folder.
-  BlackBoxKeeper(const PreparedSession& session, const RunOptions& options);
+  BlackBoxKeeper(const controller::PreparedSession& session, const controller::RunOptions& options);
   BlackBoxKeeper(const BlackBoxKeeper&) = delete;
   BlackBoxKeeper& operator=(const BlackBoxKeeper&) = delete;
   ~BlackBoxKeeper();  // the keeper writes the box, unless finish() was called
@@ -40,7 +40,7 @@ class BlackBoxKeeper {
   [[noreturn]] void keep(int said);
   void write(const std::string& reason) const;
 
-  const PreparedSession& session_;
+  const controller::PreparedSession& session_;
   std::filesystem::path folder_;
   controller::BlackBox box_;
   Shared* shared_;  // in memory shared with the keeper's process

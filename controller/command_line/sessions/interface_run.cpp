@@ -9,20 +9,20 @@
 #include <map>
 #include <thread>
 
-#include "controller/command_line/live/hardware_consent.hpp"
-#include "controller/command_line/live/live_parameters.hpp"
-#include "controller/command_line/live/realtime.hpp"
-#include "controller/command_line/live/signal_watch.hpp"
-#include "controller/command_line/preparation/bus_plan.hpp"
-#include "controller/command_line/preparation/cell_buses.hpp"
-#include "controller/command_line/preparation/modbus_rates.hpp"
-#include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/interface_network.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
 #include "controller/command_line/sessions/zero_run.hpp"
 #include "controller/library/black_box_files.hpp"
 #include "controller/library/recorded_messages.hpp"
 #include "controller/library/session_summary.hpp"
+#include "controller/live/hardware_consent.hpp"
+#include "controller/live/live_parameters.hpp"
+#include "controller/live/realtime.hpp"
+#include "controller/live/signal_watch.hpp"
+#include "controller/preparation/bus_plan.hpp"
+#include "controller/preparation/cell_buses.hpp"
+#include "controller/preparation/modbus_rates.hpp"
+#include "controller/preparation/start_check.hpp"
 #include "controller/record/frame_tap.hpp"
 #include "controller/report/latency.hpp"
 #include "controller/session/bring_up.hpp"
@@ -158,13 +158,14 @@ class Drain {
 
 }  // namespace
 
-int run_on_interfaces(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper) {
-  const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
-  require_nodes_apart(session, interfaces);
+int run_on_interfaces(const controller::PreparedSession& session, const controller::RunOptions& options,
+                      BlackBoxKeeper& keeper) {
+  const std::vector<std::string> interfaces = options.bus.interfaces(controller::bus_names(session.cell));
+  controller::require_nodes_apart(session, interfaces);
   SocketCanNetwork network = open_network(interfaces);
-  require_carried_on(interfaces, session, options);
-  require_hardware_consent(session, options, interfaces);
-  require_fd(session.cell, network);
+  controller::require_carried_on(interfaces, session, options);
+  controller::require_hardware_consent(session, options, interfaces);
+  controller::require_fd(session.cell, network);
   const controller::BusIndices indices = indices_in(network, interfaces.size());
 
   scenes::CompiledScene scene = scenes::compile(session.scene);
@@ -182,22 +183,22 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   }
   keeper.set_head(controller::replay_head(session, names_in(tap), indices));
   bring_up_devices(network, parts);
-  report_modbus_rates(session, parts);
+  controller::report_modbus_rates(session, parts);
 
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
   cycle.write_to(keeper.box());
-  SignalWatch signals([&] { cycle.request_stop(); });
+  controller::SignalWatch signals([&] { cycle.request_stop(); });
   output.introduce();
-  schedule_changes(cycle, session, options);
-  const std::unique_ptr<ControlSocket> control =
-      control_socket(options, control_handlers(cycle, session, options, keeper.box()));
+  controller::schedule_changes(cycle, session, options);
+  const std::unique_ptr<controller::ControlSocket> control =
+      controller::control_socket(options, controller::control_handlers(cycle, session, options, keeper.box()));
   controller::LatencyMeter meter(keeper.box(), cycle.parts().sensor_bus, cycle.parts().sensor->wanted_ids());
   Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, meter, replay.get(),
               messages.get(), [&] { cycle.request_stop(); });
   const SteadyClock::time_point begun = SteadyClock::now();
   controller::SessionTally tally;
   {
-    const RealtimeThread realtime;
+    const controller::RealtimeThread realtime;
     tally = controller::run_session(cycle, tap, controller::session_length(session, options), {});
     cycle.shut_down();
   }

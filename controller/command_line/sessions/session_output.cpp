@@ -5,11 +5,11 @@
 #include <cstdio>
 
 #include "controller/command_line/entry/exit_status.hpp"
-#include "controller/command_line/preparation/effective_config.hpp"
-#include "controller/command_line/preparation/session_loops.hpp"
 #include "controller/command_line/sessions/view_process.hpp"
 #include "controller/library/session_files.hpp"
 #include "controller/library/session_summary.hpp"
+#include "controller/preparation/effective_config.hpp"
+#include "controller/preparation/session_loops.hpp"
 #include "controller/report/terminal.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
@@ -26,7 +26,7 @@ constexpr const char* default_plot = "proxarm-run.svg";
 constexpr double felt_bands = 4.0;
 
 // Returns a text that says when the clocks of the scripts started; empty without a script.
-std::string clocks_text(const Summary& summary, const RunOptions& options) {
+std::string clocks_text(const Summary& summary, const controller::RunOptions& options) {
   if (options.faults.empty() && options.changes.empty() && options.orders.empty() && options.enabling.empty())
     return "";
   std::string text = "  clocks:                   --do and --enabling count from the first cycle";
@@ -44,7 +44,8 @@ std::string clocks_text(const Summary& summary, const RunOptions& options) {
 
 }  // namespace
 
-SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth)
+SessionOutput::SessionOutput(const controller::PreparedSession& session, const controller::RunOptions& options,
+                             bool with_truth)
     : session_(session),
       options_(options),
       builder_(controller::summary_config(session)),
@@ -52,13 +53,13 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
       deriver_(session.cell) {
   controller::require_plot_file(options.plot_file);
   if (!session.impedance()) poses_ = std::make_unique<controller::LedPoses>(session, options, deriver_);
-  swing_ = slowest_swing(session);
+  swing_ = controller::slowest_swing(session);
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(controller::plot_title(session));
   if (options.record_dir.empty()) return;
   writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, controller::joint_names(session.cell),
                                                         with_truth, options.signals);
-  writer_->write_file("effective.yaml", effective_config(session));
+  writer_->write_file("effective.yaml", controller::effective_config(session));
 }
 
 namespace {
@@ -99,7 +100,7 @@ void SessionOutput::introduce() const {
   const models::TipMass tip = arm.effective_mass_range(arm.start_rad(), reach.dimensions);
   std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
               session_.scene.name.c_str(), controller::rendered_text(session_).c_str(),
-              1e3 * session_.settings.period_s, 1e3 * total_delay_s(session_));
+              1e3 * session_.settings.period_s, 1e3 * controller::total_delay_s(session_));
   std::printf("the arm itself, without control: %.3g to %.3g kg at the tip", tip.min_kg, tip.max_kg);
   if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
   std::printf("\n");
@@ -241,7 +242,8 @@ void SessionOutput::add_frame(std::string_view bus, const fieldbus::CanFrame& fr
   if (writer_) writer_->add_frame(bus, frame, time_ns);
 }
 
-Summary SessionOutput::summary(const controller::Cycle& cycle, controller::SessionEnd end, const EndingCause& cause) {
+Summary SessionOutput::summary(const controller::Cycle& cycle, controller::SessionEnd end,
+                               const controller::EndingCause& cause) {
   Summary summary =
       controller::session_summary(builder_, cycle, end, {.reason = cause.word, .text = cause.text}, session_);
   summary.figures_s = std::chrono::duration<double>(spent_).count();

@@ -8,11 +8,11 @@
 #include <string>
 #include <string_view>
 
-#include "controller/command_line/live/signal_watch.hpp"
-#include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/sessions/black_box_keeper.hpp"
 #include "controller/cycle/cycle.hpp"
 #include "controller/library/led_poses.hpp"
+#include "controller/live/signal_watch.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "controller/report/plot.hpp"
 #include "controller/report/progress.hpp"
 #include "controller/report/session_record.hpp"
@@ -26,7 +26,7 @@ class SessionOutput {
  public:
   // Makes the folder for recorded files if the options ask for one. `with_truth`: the records of cycles hold the
   // simulation's truth. Throws SetupError.
-  SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth);
+  SessionOutput(const controller::PreparedSession& session, const controller::RunOptions& options, bool with_truth);
 
   // Prints what the user should know before the arm moves. Call this function after signals are watched, as the user
   // may then want to stop the session.
@@ -39,7 +39,7 @@ class SessionOutput {
   // Returns the summary of all records and of the cycle's results. Before finish(), the caller adds what only the
   // caller knows. `cause` explains SessionEnd::asked.
   [[nodiscard]] controller::Summary summary(const controller::Cycle& cycle, controller::SessionEnd end,
-                                            const EndingCause& cause);
+                                            const controller::EndingCause& cause);
   // Writes the files, draws the plot, and prints the summary on standard output. After a fault, makes the keeper write
   // the black box. Returns the exit status.
   int finish(controller::Summary summary, BlackBoxKeeper& keeper);
@@ -55,8 +55,8 @@ class SessionOutput {
   void say_poses();
   void say_how_to_get_free(controller::Phase phase) const;
 
-  const PreparedSession& session_;
-  const RunOptions& options_;
+  const controller::PreparedSession& session_;
+  const controller::RunOptions& options_;
   controller::SummaryBuilder builder_;
   controller::Progress progress_;
   std::unique_ptr<controller::PlotBuilder> plot_;

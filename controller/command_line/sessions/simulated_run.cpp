@@ -4,12 +4,12 @@
 #include <optional>
 #include <thread>
 
-#include "controller/command_line/live/live_parameters.hpp"
-#include "controller/command_line/live/signal_watch.hpp"
-#include "controller/command_line/preparation/cell_buses.hpp"
-#include "controller/command_line/preparation/modbus_rates.hpp"
 #include "controller/library/black_box_files.hpp"
 #include "controller/library/paced_run.hpp"
+#include "controller/live/live_parameters.hpp"
+#include "controller/live/signal_watch.hpp"
+#include "controller/preparation/cell_buses.hpp"
+#include "controller/preparation/modbus_rates.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -40,8 +40,8 @@ class Spectator {
 
 }  // namespace
 
-SimulatedRun::SimulatedRun(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
-                           BlackBoxKeeper& keeper)
+SimulatedRun::SimulatedRun(const controller::PreparedSession& session, const controller::PreparedSession& arm,
+                           const controller::RunOptions& options, BlackBoxKeeper& keeper)
     : session_(session),
       options_(options),
       keeper_(keeper),
@@ -49,10 +49,11 @@ SimulatedRun::SimulatedRun(const PreparedSession& session, const PreparedSession
       output_(session, options, true) {}
 
 int SimulatedRun::run() {
-  keeper_.set_head(controller::replay_head(session_, bus_names(session_.cell), buses_in_order(session_.cell)));
+  keeper_.set_head(controller::replay_head(session_, controller::bus_names(session_.cell),
+                                           controller::buses_in_order(session_.cell)));
   if (!options_.record_dir.empty()) keep_record();
   loop_.start();
-  report_modbus_rates(session_, loop_.cycle().parts());
+  controller::report_modbus_rates(session_, loop_.cycle().parts());
   return run_cycles();
 }
 
@@ -67,11 +68,11 @@ void SimulatedRun::keep_record() {
 int SimulatedRun::run_cycles() {
   Cycle& cycle = loop_.cycle();
   cycle.write_to(keeper_.box());
-  SignalWatch signals([&] { cycle.request_stop(); });
+  controller::SignalWatch signals([&] { cycle.request_stop(); });
   output_.introduce();
-  schedule_changes(cycle, session_, options_);
-  const std::unique_ptr<ControlSocket> control =
-      control_socket(options_, control_handlers(cycle, session_, options_, keeper_.box()));
+  controller::schedule_changes(cycle, session_, options_);
+  const std::unique_ptr<controller::ControlSocket> control =
+      controller::control_socket(options_, controller::control_handlers(cycle, session_, options_, keeper_.box()));
   Spectator spectator(options_.view && !options_.pace);
   const controller::PacedRun run = controller::run_at_pace(
       loop_, session_, options_, [this](const CycleRecord& record, const sim::Truth& truth) { drain(record, truth); },

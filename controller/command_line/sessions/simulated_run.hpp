@@ -3,10 +3,10 @@
 
 #include <memory>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
 #include "controller/library/recorded_messages.hpp"
 #include "controller/library/simulated_loop.hpp"
+#include "controller/preparation/prepared_session.hpp"
 
 namespace proxarm::command_line {
 
@@ -14,8 +14,8 @@ class SimulatedRun {
  public:
   // Throws SetupError. `arm` is the simulated arm, which may differ from the session's cell. Preconditions: `session`,
   // `options` and `keeper` outlive the run.
-  SimulatedRun(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
-               BlackBoxKeeper& keeper);
+  SimulatedRun(const controller::PreparedSession& session, const controller::PreparedSession& arm,
+               const controller::RunOptions& options, BlackBoxKeeper& keeper);
 
   // Runs the session and returns the exit status. Throws SetupError only before the arm moves.
   int run();
@@ -25,8 +25,8 @@ class SimulatedRun {
   int run_cycles();
   void drain(controller::CycleRecord record, const sim::Truth& truth);
 
-  const PreparedSession& session_;
-  const RunOptions& options_;
+  const controller::PreparedSession& session_;
+  const controller::RunOptions& options_;
   BlackBoxKeeper& keeper_;
   controller::SimulatedLoop loop_;
   SessionOutput output_;

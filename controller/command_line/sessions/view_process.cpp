@@ -14,8 +14,8 @@
 #include <thread>
 
 #include "controller/command_line/entry/child_process.hpp"
-#include "controller/command_line/live/control_socket.hpp"
-#include "controller/command_line/live/signal_watch.hpp"
+#include "controller/live/control_socket.hpp"
+#include "controller/live/signal_watch.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/files/json.hpp"
 
@@ -47,11 +47,13 @@ std::string readable_twice(const fs::path& file, const char* option) {
   return file.empty() ? "" : fs::absolute(file).lexically_normal().string();
 }
 
-Json hello_of(const PreparedSession& session, const RunOptions& options, ViewProcess::Shows shows) {
+Json hello_of(const controller::PreparedSession& session, const controller::RunOptions& options,
+              ViewProcess::Shows shows) {
   const bool arm_alone = shows == ViewProcess::Shows::simulated_arm;
   const controller::SessionSettings& settings = session.settings;
   fs::path control;
-  if (options.view_control) control = options.control == "default" ? default_control_path() : options.control;
+  if (options.view_control)
+    control = options.control == "default" ? controller::default_control_path() : options.control;
   return {{"cell", readable_twice(session.cell.file, "cell")},
           {"scene", arm_alone && options.scene.empty() ? "" : readable_twice(session.scene.file, "--scene")},
           {"tool", session.scene.tool ? readable_twice(session.scene.tool->file, "--tool") : ""},
@@ -87,7 +89,7 @@ std::string read_line(int line) {
 
 }  // namespace
 
-void tell_margin(const ViewPlace& place, const controller::PassedPoses::Place& judged) {
+void tell_margin(const controller::ViewPlace& place, const controller::PassedPoses::Place& judged) {
   const Json told{{"margin",
                    {{"time_s", judged.time_s},
                     {"felt_mass_kg", judged.felt_mass_kg},
@@ -96,14 +98,17 @@ void tell_margin(const ViewPlace& place, const controller::PassedPoses::Place& j
   (void)send(place.line, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
-fs::path view_control_path() { return default_control_path().parent_path() / ("view-" + std::to_string(getpid())); }
+fs::path view_control_path() {
+  return controller::default_control_path().parent_path() / ("view-" + std::to_string(getpid()));
+}
 
 void remove_view_control() {
   unlink(view_control_path().c_str());
   unlink((view_control_path().string() + ".lock").c_str());
 }
 
-ViewProcess::ViewProcess(const PreparedSession& session, const RunOptions& options, int memory, Shows shows) {
+ViewProcess::ViewProcess(const controller::PreparedSession& session, const controller::RunOptions& options, int memory,
+                         Shows shows) {
   start(memory);
   try {
     greet(session, options, shows);
@@ -137,7 +142,8 @@ void ViewProcess::start(int memory) {
   }
 }
 
-void ViewProcess::greet(const PreparedSession& session, const RunOptions& options, Shows shows) {
+void ViewProcess::greet(const controller::PreparedSession& session, const controller::RunOptions& options,
+                        Shows shows) {
   send_line(line_, hello_of(session, options, shows));
   const Json answer = Json::parse(read_line(line_)).value_or(Json());
   if (const auto url = answer.text_of("url")) {
@@ -153,7 +159,7 @@ void ViewProcess::greet(const PreparedSession& session, const RunOptions& option
 void ViewProcess::show_end(int exit_status) {
   if (!send_line(line_, {{"ended", "the session is over"}, {"exit_status", exit_status}})) return;
   std::atomic<bool> asked{false};
-  SignalWatch signals([&] { asked.store(true); });  // before the message offers Ctrl-C
+  controller::SignalWatch signals([&] { asked.store(true); });  // before the message offers Ctrl-C
   std::fprintf(stderr, "proxarm: the session is over; its view stays at %s until Ctrl-C\n", url_.c_str());
   while (!asked.load() && waitpid(child_, nullptr, WNOHANG) == 0) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));

@@ -10,8 +10,8 @@
 #include <optional>
 #include <string>
 
-#include "controller/command_line/live/browser.hpp"
-#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/entry/browser.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "controller/stability/passed_poses.hpp"
 
 namespace proxarm::command_line {
@@ -25,12 +25,13 @@ class ViewProcess {
 
   // Starts the view's process and prints the view's URL on standard error. `memory` is the descriptor of the black
   // box's memory. Precondition: no other thread runs yet. Throws SetupError if the session can't be shown.
-  ViewProcess(const PreparedSession& session, const RunOptions& options, int memory, Shows shows = Shows::session);
+  ViewProcess(const controller::PreparedSession& session, const controller::RunOptions& options, int memory,
+              Shows shows = Shows::session);
   ViewProcess(const ViewProcess&) = delete;
   ViewProcess& operator=(const ViewProcess&) = delete;
   ~ViewProcess();  // ends the view
 
-  [[nodiscard]] const ViewPlace& place() const noexcept { return place_; }
+  [[nodiscard]] const controller::ViewPlace& place() const noexcept { return place_; }
 
   // Tells the viewers that the session is over. Returns when a signal comes or the view's process ends; until then the
   // view stays.
@@ -38,17 +39,17 @@ class ViewProcess {
 
  private:
   void start(int memory);
-  void greet(const PreparedSession& session, const RunOptions& options, Shows shows);
+  void greet(const controller::PreparedSession& session, const controller::RunOptions& options, Shows shows);
 
   std::string url_;
-  ViewPlace place_;
+  controller::ViewPlace place_;
   std::optional<BrowserDoor> door_;
   int line_ = -1;
   int child_ = -1;
 };
 
 // Sends the viewers the margin to instability at the place that was judged last. Doesn't block.
-void tell_margin(const ViewPlace& place, const controller::PassedPoses::Place& judged);
+void tell_margin(const controller::ViewPlace& place, const controller::PassedPoses::Place& judged);
 
 // Returns the path of the control socket that --view-control uses if --control isn't given. The path differs for each
 // session.

@@ -3,22 +3,22 @@
 #include <cmath>
 #include <cstdio>
 
-#include "controller/command_line/live/hardware_consent.hpp"
-#include "controller/command_line/preparation/cell_buses.hpp"
-#include "controller/command_line/preparation/proof_file.hpp"
+#include "controller/live/hardware_consent.hpp"
+#include "controller/preparation/cell_buses.hpp"
+#include "controller/preparation/proof_file.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
 
 using controller::Cycle;
 
-ZeroFile zero_of(const PreparedSession& session, const Cycle& cycle, bool real_arm) {
+controller::ZeroFile zero_of(const controller::PreparedSession& session, const Cycle& cycle, bool real_arm) {
   const controller::Measurement& measurement = cycle.measurement();
   const models::Wrench& bias_S = measurement.compensation().bias_S();
   const models::JointVector& motor_rad = measurement.now().motor_rad;
-  return {.cell_sha256 = cell_sha256(session),
+  return {.cell_sha256 = controller::cell_sha256(session),
           .real_arm = real_arm,
-          .date = today(),
+          .date = controller::today(),
           .force_S_N = {bias_S.force.x(), bias_S.force.y(), bias_S.force.z()},
           .torque_S_Nm = {bias_S.torque.x(), bias_S.torque.y(), bias_S.torque.z()},
           .noise_N = measurement.now().bias.noise_N,
@@ -26,9 +26,10 @@ ZeroFile zero_of(const PreparedSession& session, const Cycle& cycle, bool real_a
           .motor_rad = {motor_rad.data(), motor_rad.data() + motor_rad.size()}};
 }
 
-void know_zero(PreparedSession& session, const RunOptions& options) {
-  const bool real = !options.bus.simulated() && is_real(session, options.bus.interfaces(bus_names(session.cell)));
-  const std::optional<ZeroFile> kept = kept_zero(session, real);
+void know_zero(controller::PreparedSession& session, const controller::RunOptions& options) {
+  const bool real = !options.bus.simulated() &&
+                    controller::is_real(session, options.bus.interfaces(controller::bus_names(session.cell)));
+  const std::optional<controller::ZeroFile> kept = controller::kept_zero(session, real);
   if (kept) {
     session.settings.zero_S_N = kept->force_S_N;
   } else if (real) {
@@ -36,12 +37,14 @@ void know_zero(PreparedSession& session, const RunOptions& options) {
   }
 }
 
-void keep_zero(const PreparedSession& session, const RunOptions& options, const std::vector<std::string>& interfaces,
-               const Cycle& cycle) {
+void keep_zero(const controller::PreparedSession& session, const controller::RunOptions& options,
+               const std::vector<std::string>& interfaces, const Cycle& cycle) {
   const bool accepted = std::isfinite(options.settings.zero_drift_N);
-  if (accepted || cycle.supervisor().faulted() || cycle.rendered_cycles() == 0 || !is_real(session, interfaces)) return;
+  if (accepted || cycle.supervisor().faulted() || cycle.rendered_cycles() == 0 ||
+      !controller::is_real(session, interfaces))
+    return;
   try {
-    write_zero(zero_path(session.cell), zero_of(session, cycle, true));
+    controller::write_zero(controller::zero_path(session.cell), zero_of(session, cycle, true));
   } catch (const description::SetupError& error) {
     std::fprintf(stderr, "proxarm: warning: %s\n", error.what());
   }

@@ -1,5 +1,5 @@
 // An assessment's figures against motions whose stops and clamps are known in closed form; no arm is simulated here.
-#include "controller/assessment/assessment.hpp"
+#include "controller/extras/assessment/assessment.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <fstream>
 #include <string>
 
-#include "controller/assessment/assessment_report.hpp"
+#include "controller/extras/assessment/assessment_report.hpp"
 #include "models/base/setup_error.hpp"
 #include "tests/source_file.hpp"
 

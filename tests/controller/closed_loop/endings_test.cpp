@@ -10,7 +10,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "controller/proof/bus_loss.hpp"
+#include "controller/extras/proof/bus_loss.hpp"
 #include "fieldbus/cia402/silence_watch.hpp"
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
 #include "tests/sim/cell/default_cell.hpp"

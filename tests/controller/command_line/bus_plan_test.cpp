@@ -1,4 +1,4 @@
-#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/preparation/bus_plan.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/preparation/prepared_session.hpp"
 #include "models/base/setup_error.hpp"
 #include "tests/source_file.hpp"
 
@@ -17,16 +17,16 @@ namespace {
 struct OverloadedTest : ::testing::Test {
   OverloadedTest() {
     options.cell = source_file("models/cells/default.yaml");
-    session = prepare(options);
+    session = controller::prepare(options);
     session.settings.period_s = 0.25e-3;
   }
   void require(const std::vector<std::string>& real) {
-    require_carried_on({"a", "b", "c"}, session, options, [&](const std::string& interface) {
+    controller::require_carried_on({"a", "b", "c"}, session, options, [&](const std::string& interface) {
       return std::find(real.begin(), real.end(), interface) == real.end();
     });
   }
-  RunOptions options;
-  PreparedSession session;
+  controller::RunOptions options;
+  controller::PreparedSession session;
 };
 
 TEST_F(OverloadedTest, ARealBusThatCantCarryTheTimestepIsRefused) {
@@ -57,8 +57,8 @@ TEST_F(OverloadedTest, WhatIsCarriedIsPassedInSilence) {
 TEST_F(OverloadedTest, BusesThatShareAnInterfaceAreOneWire) {
   session.settings.period_s = 1e-3;
   const auto real = [](const std::string&) { return false; };
-  EXPECT_NO_THROW(require_carried_on({"a", "b", "c"}, session, options, real));
-  EXPECT_THROW(require_carried_on({"a", "a", "a"}, session, options, real), description::SetupError);
+  EXPECT_NO_THROW(controller::require_carried_on({"a", "b", "c"}, session, options, real));
+  EXPECT_THROW(controller::require_carried_on({"a", "a", "a"}, session, options, real), description::SetupError);
 }
 
 }  // namespace

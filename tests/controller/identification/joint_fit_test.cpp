@@ -1,5 +1,5 @@
 // The judge is a joint of its own, integrated here in time: it shares no line with the simulated arm or with the fit.
-#include "controller/identification/joints/joint_fit.hpp"
+#include "controller/extras/identification/joints/joint_fit.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "controller/proof/proof_session.hpp"
+#include "controller/extras/proof/proof_session.hpp"
 #include "models/base/setup_error.hpp"
 #include "tests/allocation_count.hpp"
 #include "tests/source_file.hpp"

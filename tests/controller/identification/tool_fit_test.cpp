@@ -1,5 +1,5 @@
 // The fit against readings that are computed here, of tools, zeros and mistakes that are known.
-#include "controller/identification/tool_fit.hpp"
+#include "controller/extras/identification/tool_fit.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "controller/identification/tool_stations.hpp"
+#include "controller/extras/identification/tool_stations.hpp"
 
 #include <gtest/gtest.h>
 
-#include "controller/identification/identification.hpp"
+#include "controller/extras/identification/identification.hpp"
 #include "models/base/setup_error.hpp"
 #include "tests/source_file.hpp"
 

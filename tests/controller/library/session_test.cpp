@@ -81,7 +81,7 @@ TEST(Session, AHandOfOnesOwnThatPullsAsTheFilesDoesMovesTheArmAlike) {
   Session with_file(options);
   const std::string expected = with_file.run().setpoint_sha256;
   Session with_own(options);
-  const command_line::PreparedSession& prepared = with_own.prepared();
+  const controller::PreparedSession& prepared = with_own.prepared();
   // What the simulated arm is made of, for the place at which its hand takes hold of it.
   const sim::Plant there(prepared.cell, prepared.sensor, prepared.hand);
   const sim::Hand hand(prepared.hand, there.tool().X_WT);

@@ -1,6 +1,6 @@
 // The judgement of a proof against readings that are computed here from another cell's kinematics: what the arm is, and
 // what the controller takes it for, differ by one mistake each.
-#include "controller/proof/proof.hpp"
+#include "controller/extras/proof/proof.hpp"
 
 #include <gtest/gtest.h>
 

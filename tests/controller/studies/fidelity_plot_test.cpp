@@ -1,9 +1,9 @@
-#include "controller/studies/fidelity_plot.hpp"
+#include "controller/extras/studies/fidelity_plot.hpp"
 
 #include <gtest/gtest.h>
 
-#include "controller/studies/fidelity.hpp"
-#include "controller/studies/fidelity_bands.hpp"
+#include "controller/extras/studies/fidelity.hpp"
+#include "controller/extras/studies/fidelity_bands.hpp"
 
 namespace proxarm::studies {
 namespace {

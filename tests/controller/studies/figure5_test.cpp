@@ -1,4 +1,4 @@
-#include "controller/studies/figure5.hpp"
+#include "controller/extras/studies/figure5.hpp"
 
 #include <gtest/gtest.h>
 

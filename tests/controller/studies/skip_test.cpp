@@ -1,4 +1,4 @@
-#include "controller/studies/skip.hpp"
+#include "controller/extras/studies/skip.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "controller/studies/stability_map.hpp"
+#include "controller/extras/studies/stability_map.hpp"
 
 #include <gtest/gtest.h>
 

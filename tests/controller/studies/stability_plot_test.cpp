@@ -1,10 +1,10 @@
-#include "controller/studies/stability_plot.hpp"
+#include "controller/extras/studies/stability_plot.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "controller/studies/stability_map.hpp"
+#include "controller/extras/studies/stability_map.hpp"
 
 namespace proxarm::studies {
 namespace {

@@ -1,12 +1,12 @@
-#include "controller/studies/common/chart.hpp"
+#include "controller/extras/studies/common/chart.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "controller/studies/common/chart_page.hpp"
-#include "controller/studies/common/map_chart.hpp"
+#include "controller/extras/studies/common/chart_page.hpp"
+#include "controller/extras/studies/common/map_chart.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace proxarm::studies {

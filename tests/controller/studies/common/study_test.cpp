@@ -1,4 +1,4 @@
-#include "controller/studies/common/study.hpp"
+#include "controller/extras/studies/common/study.hpp"
 
 #include <gtest/gtest.h>
 

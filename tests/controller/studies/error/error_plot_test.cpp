@@ -1,4 +1,4 @@
-#include "controller/studies/error/error_plot.hpp"
+#include "controller/extras/studies/error/error_plot.hpp"
 
 #include <gtest/gtest.h>
 

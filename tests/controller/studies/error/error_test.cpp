@@ -1,10 +1,10 @@
-#include "controller/studies/error/error.hpp"
+#include "controller/extras/studies/error/error.hpp"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "controller/studies/error/error_cases.hpp"
+#include "controller/extras/studies/error/error_cases.hpp"
 
 namespace proxarm::studies {
 namespace {

@@ -1,6 +1,6 @@
 // The story: the implicit penalty method took its Jacobian by differences, eight times the time of the closed form; the
 // study then called (26) 7.5 times as fast as a rival that, at its best, was level.
-#include "controller/studies/error/penalty_world.hpp"
+#include "controller/extras/studies/error/penalty_world.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "controller/studies/error/tool_error.hpp"
+#include "controller/extras/studies/error/tool_error.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "controller/studies/error/tool_cases.hpp"
+#include "controller/extras/studies/error/tool_cases.hpp"
 
 namespace proxarm::studies {
 namespace {

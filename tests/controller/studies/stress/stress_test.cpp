@@ -1,10 +1,10 @@
-#include "controller/studies/stress/stress.hpp"
+#include "controller/extras/studies/stress/stress.hpp"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "controller/studies/stress/tool_run.hpp"
+#include "controller/extras/studies/stress/tool_run.hpp"
 #include "tests/models/surfaces/random_states.hpp"
 
 namespace proxarm::studies {

@@ -1,4 +1,4 @@
-#include "controller/studies/stress/tool_laws.hpp"
+#include "controller/extras/studies/stress/tool_laws.hpp"
 
 #include <gtest/gtest.h>
 

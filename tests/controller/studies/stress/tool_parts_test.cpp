@@ -1,4 +1,4 @@
-#include "controller/studies/stress/tool_parts.hpp"
+#include "controller/extras/studies/stress/tool_parts.hpp"
 
 #include <gtest/gtest.h>
 

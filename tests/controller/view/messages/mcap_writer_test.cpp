@@ -1,4 +1,4 @@
-#include "controller/view/messages/mcap_writer.hpp"
+#include "controller/messages/mcap_writer.hpp"
 
 #include <gtest/gtest.h>
 

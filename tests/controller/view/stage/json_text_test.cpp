@@ -1,4 +1,4 @@
-#include "controller/view/stage/json_text.hpp"
+#include "controller/stage/json_text.hpp"
 
 #include <gtest/gtest.h>
 

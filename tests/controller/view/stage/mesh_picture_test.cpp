@@ -1,4 +1,4 @@
-#include "controller/view/stage/mesh_picture.hpp"
+#include "controller/stage/mesh_picture.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "controller/view/stage/moment.hpp"
+#include "controller/stage/moment.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "controller/view/stage/words.hpp"
+#include "controller/stage/words.hpp"
 
 namespace proxarm::view {
 namespace {

@@ -1,4 +1,4 @@
-#include "controller/view/stage/present_settings.hpp"
+#include "controller/stage/present_settings.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "controller/view/web/gate.hpp"
+#include "controller/extras/view/web/gate.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "controller/view/web/budget.hpp"
-#include "controller/view/web/secret.hpp"
+#include "controller/extras/view/web/budget.hpp"
+#include "controller/extras/view/web/secret.hpp"
 
 namespace proxarm::view {
 namespace {
