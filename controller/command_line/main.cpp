@@ -147,7 +147,7 @@ class Commands {
                                 [this] { return command_line::status_command(status_); });
     status->add_option("--control", status_.control, control_text)->type_name("PATH");
     status->add_flag("--watch", status_.watch, "four times a second, until the session ends");
-    status->add_flag("--json", status_.json, "a line of JSON (docs/files.md#the-status-of-a-session)");
+    status->add_flag("--json", status_.json, "a line of JSON (docs/reference/files.md#the-status-of-a-session)");
   }
 
   void add_files() {

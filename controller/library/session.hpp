@@ -5,7 +5,7 @@
 //
 // It takes the options of `proxarm run` (options.hpp), is assembled and checked by the same code, refuses the same with
 // the same words, and commands the same setpoints, to the bit. World, hand, force sensor and drives can be your own
-// (docs/library.md). Only the command line runs a real arm, with its supervision, consent and clocks.
+// (docs/how_to/library.md). Only the command line runs a real arm, with its supervision, consent and clocks.
 #pragma once
 
 #include <array>
@@ -62,9 +62,9 @@ class Session {
 
   // Asks it to stop.
   void stop() noexcept;
-  // Sends a line as to the session's socket (docs/supervision.md) and returns the answer: "hold", "resume", "mass=3kg",
-  // "wall.friction=0.2", "status". A tab separates changes that are made together. Throws SetupError if the session
-  // refuses, or if none runs.
+  // Sends a line as to the session's socket (docs/reference/supervision.md) and returns the answer: "hold", "resume",
+  // "mass=3kg", "wall.friction=0.2", "status". A tab separates changes that are made together. Throws SetupError if the
+  // session refuses, or if none runs.
   std::string ask(const std::string& line);
 
   // ---- any time

@@ -46,7 +46,7 @@ void print_checklist(const PreparedSession& session, const std::vector<std::stri
   out << "This will enable the drives of a real arm on " << list(real) << ". It is no safety function. Check that\n"
       << "  1. the E-stop and STO act in hardware, on all drives, and have been tried today\n"
       << "  2. the enabling input has been tried: " << enabling_text(session) << "\n"
-      << "  3. brakes hold the arm without power, and people know how to get free: docs/supervision.md\n"
+      << "  3. brakes hold the arm without power, and people know how to get free: docs/reference/supervision.md\n"
       << "  4. the limits are this arm's: tool " << number_text(limits.max_tool_speed_m_per_s) << " m/s and "
       << number_text(limits.max_tool_acceleration_m_per_s2) << " m/s2, force " << number_text(limits.max_force_N)
       << " N, power " << number_text(limits.max_power_W) << " W, workspace " << (box ? "set" : "NOT SET") << "\n"
@@ -67,7 +67,7 @@ void require_enabling_input(const PreparedSession& session) {
                     .key = "enabling_input",
                     .found = "none",
                     .expected = "one: real drives are enabled only while somebody presses a switch",
-                    .advice = "see docs/supervision.md; without one, on your own responsibility: "
+                    .advice = "see docs/reference/supervision.md; without one, on your own responsibility: "
                               "--without-enabling-input"});
 }
 

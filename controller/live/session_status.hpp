@@ -11,8 +11,8 @@
 namespace proxarm::controller {
 
 // Answers "status" with a line of JSON, {"version": 1, "phase": "rendering", …}
-// (docs/files.md#the-status-of-a-session), and "status text" with a line for people. Returns nullopt if the line asks
-// for something else. Any thread may call this function.
+// (docs/reference/files.md#the-status-of-a-session), and "status text" with a line for people. Returns nullopt if the
+// line asks for something else. Any thread may call this function.
 std::optional<std::string> session_status(const std::string& line, const BoxReader& box,
                                           const PreparedSession& session);
 

@@ -435,7 +435,7 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
 // Moves the arm to the proxy. With lookahead, the arm is sent to the place that the proxy would reach within the
 // horizon H if it coasted. With a constant hand's force h the proxy would be ½H²h/M further. This term is left out,
 // because the sensor also measures the inertial force of the hand's mass: fed back, this force would halve the horizon
-// at which the arm's elastic modes stay calm (figures in docs/design.md).
+// at which the arm's elastic modes stay calm (figures in docs/explanation/design.md).
 bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   if (tool().turns()) {
     cycle.record.proxy_inertia_kg_m2 = parts_.tool->inertia_kg_m2();

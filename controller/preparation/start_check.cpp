@@ -353,7 +353,8 @@ void require_enabling_switch(const PreparedSession& session, const RunOptions& o
   };
   if (!session.cell.enabling_input) {
     refuse("a cell without an enabling input", "one whose file has enabling_input",
-           "in a copy of models/cells/default.yaml: enabling_input: {drive: axis_6, bit: 16} (docs/supervision.md)");
+           "in a copy of models/cells/default.yaml: enabling_input: {drive: axis_6, bit: 16} "
+           "(docs/reference/supervision.md)");
   }
   if (session.settings.without_enabling_input) refuse("--without-enabling-input", "one of the two", "");
   const bool squeezed = std::any_of(options.enabling.begin(), options.enabling.end(),

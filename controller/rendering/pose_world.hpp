@@ -18,7 +18,7 @@
 //
 // In a scene with moving objects a step can't be repeated. So the rotation in such scenes, and the position in all
 // scenes, keep the limits only if contacts don't move q from p̂ away from q(k−1). The guards of the setpoints have the
-// last word (docs/tool.md).
+// last word (docs/how_to/tool.md).
 #pragma once
 
 #include <memory>

@@ -230,7 +230,7 @@ std::string poses_text(const UnstablePlaces& there) {
 
 namespace {
 
-// Weber fraction of a mass moved by hand: hands notice smaller differences only rarely (docs/view.md cites the
+// Weber fraction of a mass moved by hand: hands notice smaller differences only rarely (docs/how_to/view.md cites the
 // sources).
 constexpr double noticeable_mass_share = 0.1;
 

@@ -34,7 +34,7 @@ fieldbus::DriveSettings drive_settings(const description::Cell& cell, const Sess
   fieldbus::DriveSettings drive;
   drive.period_ns = std::llround(settings.period_s * 1e9);
   drive.stop_without_controller(cell.supervision.bus_loss_stop_s);
-  // The drive's heartbeat frame could delay a bus's last setpoint beyond the deadline: docs/design.md.
+  // The drive's heartbeat frame could delay a bus's last setpoint beyond the deadline: docs/explanation/design.md.
   drive.heartbeat_in_operation = false;
   return drive;
 }

@@ -1,5 +1,6 @@
 // Reads and writes signals.bin and contacts.bin: a record's tables as numbers, column by column. A program that maps
-// the file into memory reads any column of an hour in milliseconds (docs/files.md). All numbers are little-endian.
+// the file into memory reads any column of an hour in milliseconds (docs/reference/files.md). All numbers are
+// little-endian.
 //
 //   byte  0   "PXSIGNAL"
 //         8   u32, version: 1; 2 if blocks are packed

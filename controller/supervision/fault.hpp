@@ -1,9 +1,9 @@
 // Lists all faults of a running session, the arm's reactions to them, and their descriptions for the user.
 //
 // Two things are no faults: set-up mistakes, which throw SetupError before anything moves, and active limits, which are
-// recorded in separate flags. Each fault has one reaction (see the table in fault.cpp and docs/supervision.md); if that
-// table allows it, a cell may choose another reaction. A stop latches the fault, and the session ends with exit status
-// 1 unless a person resets the fault.
+// recorded in separate flags. Each fault has one reaction (see the table in fault.cpp and
+// docs/reference/supervision.md); if that table allows it, a cell may choose another reaction. A stop latches the
+// fault, and the session ends with exit status 1 unless a person resets the fault.
 #pragma once
 
 #include <array>

@@ -1,4 +1,5 @@
-// Keeps the phase of a session. Events change the phase by the table transitions() (shown in docs/supervision.md).
+// Keeps the phase of a session. Events change the phase by the table transitions() (shown in
+// docs/reference/supervision.md).
 //
 //   idle ─▶ enabling ─▶ taring ─▶ rendering ─▶ stopping ─▶ disabling ─▶ done
 //                                 ▲       │                    │

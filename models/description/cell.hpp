@@ -325,7 +325,7 @@ struct Cell {
 
 // Reads a cell's file and checks everything that can be checked without the URDF. The keys of the file are the names of
 // the fields above, nested like the structs, except limits.workspace_m {min, max} and limits.keep_out_m [{min, max},
-// …]. docs/files.md lists the optional keys. Throws SetupError, with file, line and key.
+// …]. docs/reference/files.md lists the optional keys. Throws SetupError, with file, line and key.
 Cell load_cell(const std::filesystem::path& file);
 // Does what load_cell() does, for a file that has already been read.
 Cell read_cell(const YamlNode& root);

@@ -16,7 +16,7 @@ struct StepCost {
 StepCost measure_step(const Scene& scene);
 
 // Returns the description as text for the user. On curved surfaces it has a note on steps of first order (see
-// docs/scenes.md).
+// docs/reference/scenes.md).
 std::string explain(const Scene& scene);
 
 }  // namespace proxarm::scenes

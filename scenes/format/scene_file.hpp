@@ -1,4 +1,4 @@
-// Reads scene files; docs/scenes.md describes the format.
+// Reads scene files; docs/reference/scenes.md describes the format.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // The tool that the arm holds, as its file describes it: shapes that are fixed to each other. They are in the tool's
-// frame T, whose origin is the rendered point. docs/tool.md describes the keys.
+// frame T, whose origin is the rendered point. docs/how_to/tool.md describes the keys.
 #pragma once
 
 #include <filesystem>

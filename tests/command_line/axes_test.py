@@ -127,9 +127,9 @@ class Axes(ProgramTest):
                             "receive_window", "0.95")
 
     def test_the_bench_with_its_switch_fits_and_runs(self):
-        # As docs/first-bus.md has it: a copy, and this line at its end.
+        # As docs/tutorial/first_bus.md has it: a copy, and this line at its end.
         line = "enabling_input: {drive: shoulder, bit: 16}"
-        self.assertIn(f"echo '{line}' >> models/cells/mine.yaml", (SOURCE / "docs/first-bus.md").read_text())
+        self.assertIn(f"echo '{line}' >> models/cells/mine.yaml", (SOURCE / "docs/tutorial/first_bus.md").read_text())
         bench = self.copies() / "models/cells/bench.yaml"
         mine = bench.with_name("mine.yaml")
         mine.write_text(bench.read_text() + line + "\n")

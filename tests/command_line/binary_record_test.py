@@ -1,4 +1,4 @@
-"""Records with signals.bin: read here from the layout that docs/files.md promises, and held against signals.csv."""
+"""Records with signals.bin: read here from the layout that docs/reference/files.md promises, and held against signals.csv."""
 import array
 import csv
 import itertools
@@ -21,7 +21,7 @@ FORMS = {"csv": {"signals.csv", "contacts.csv", "frames.log"}, "binary": {"signa
 
 
 def read_table(data):
-    """Columns by name, as text, from docs/files.md alone."""
+    """Columns by name, as text, from docs/reference/files.md alone."""
     assert data[:8] == b"PXSIGNAL"
     version, begin, rows, count = struct.unpack("<4I", data[8:24])
     assert version in (1, 2) and (begin % 4096, rows) == (0, ROWS)

@@ -23,7 +23,7 @@ from identify_hunt import rooted  # noqa: E402
 # Sanitizers take ten times as long for everything.
 SLOWER = 10 if os.environ.get("PROXARM_SLOW_BUILD") else 1
 UNTIL_RENDERING_S = 1.0 if SLOWER == 1 else 3.0
-PROMPT_S = 0.1 * SLOWER  # what docs/supervision.md promises of an answer
+PROMPT_S = 0.1 * SLOWER  # what docs/reference/supervision.md promises of an answer
 SWEEP = ("--scene", "scenes/free.yaml", "--hand", SOURCE / "sim/hands/sweep.yaml")
 
 

@@ -4,7 +4,7 @@ import unittest
 
 from harness import SOURCE, ProgramTest
 
-PAGES = [SOURCE / "README.md", *sorted((SOURCE / "docs").glob("*.md"))]
+PAGES = [SOURCE / "README.md", *sorted((SOURCE / "docs").rglob("*.md"))]
 # What can't run here, and why. Of each kind at least one is expected to stand in the docs.
 ELSEWHERE = {
     "--view": "stays until Ctrl-C: view_test.py runs it",
@@ -84,7 +84,7 @@ class Docs(ProgramTest):
                     (self.copies() / "models/cells/default.yaml").write_text(cell)
 
     def test_every_key_of_the_summary_and_column_of_the_signals_is_described(self):
-        text = (SOURCE / "docs/files.md").read_text()
+        text = (SOURCE / "docs/reference/files.md").read_text()
         summary = self.summary("--duration", "0.5s", "--record", self.folder / "record")
         named = set(re.findall(r"`([a-z_A-Z0-9]+)`", text))
         ellipsis = {"tool_penetration_touch_max_m", "tool_penetration_sliding_max_m", "contact_force_error_max_N"}
@@ -96,7 +96,7 @@ class Docs(ProgramTest):
             self.assertTrue(any(re.fullmatch(pattern, column) for pattern in patterns), column)
 
     def test_every_key_of_a_cell_that_is_read_stands_in_its_reference(self):
-        text = (SOURCE / "docs/keys.md").read_text()
+        text = (SOURCE / "docs/reference/keys.md").read_text()
         text = text[text.index("## Keys of a cell"):text.index("## Keys of a hand")]
         named = set(re.findall(r"`([a-z_A-Z0-9]+)`", text))
         getters = ("number|number_or|integer|integer_or|boolean_or|string|string_or|choice|choice_or|vec3|vec3_or|numbers|map|find_map|"

@@ -2,7 +2,7 @@
 
 Each row is played by the simulated far end, once in the program's own process (drive_quirks_test.py) and once by two
 processes on a real kernel's CAN (tests/vcan/drive_quirks_test.py). What is expected is what CiA 301 and 402 or the
-documentation (docs/buses.md) say, never what the program was seen to do.
+documentation (docs/reference/buses.md) say, never what the program was seen to do.
 """
 import dataclasses
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The examples of docs/library.md: the page shows what the files have, and the closed loop of the library is that of the
+"""The examples of docs/how_to/library.md: the page shows what the files have, and the closed loop of the library is that of the
 program, to the bit. tests/library runs them all, tests/install builds them against the installed package."""
 import os
 import pathlib
@@ -9,7 +9,7 @@ import unittest
 
 from harness import SOURCE, ProgramTest, program
 
-PAGE = SOURCE / "docs/library.md"
+PAGE = SOURCE / "docs/how_to/library.md"
 EXAMPLES = SOURCE / "docs/examples"
 
 
@@ -28,7 +28,7 @@ class Library(ProgramTest):
                 else:
                     self.assertEqual(sum(block in file for file in files[language]), 1)
         for file in EXAMPLES.glob("*.cpp"):
-            self.assertIn(f"[{file.name}](examples/{file.name})", text)
+            self.assertIn(f"[{file.name}](../examples/{file.name})", text)
 
     def test_the_library_moves_the_arm_as_the_program_does(self):
         example = pathlib.Path(program()).parents[1] / "tests/library/example_closed_loop"

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """What drives on Modbus do otherwise than a master would wish, and what is then to happen: a table, simulated.
 
-Expected is what the Modbus specification and docs/buses.md ("Drives on Modbus") say. Answers that are late, echoed or
+Expected is what the Modbus specification and docs/reference/buses.md ("Drives on Modbus") say. Answers that are late, echoed or
 another's on real lines: tests/sim/devices/modbus_server_test.cpp.
 """
 import unittest

@@ -137,7 +137,7 @@ class Plan(ProgramTest):
         self.assertEqual(tcp.status, 0, tcp.err)
         self.assertIn("rail: Modbus TCP, 127.0.0.1, port 15020\n  rail, unit 1: 200 exchanges/s of 200 wanted; a setpoint "
                       "comes 7.5 ms later than on CAN\n", tcp.out)
-        # The arithmetic stands in docs/buses.md: 34 characters of 11 bits at 115,200 baud, and twice 1.75 ms.
+        # The arithmetic stands in docs/reference/buses.md: 34 characters of 11 bits at 115,200 baud, and twice 1.75 ms.
         line = "device: /dev/ttyUSB0, baud: 115200"
         rtu = self.call("plan", self.written("rtu.yaml", rail.replace("host: 127.0.0.1, port: 15020", line)))
         self.assertIn("rail: Modbus RTU, /dev/ttyUSB0, 115200 baud\n  rail, unit 1: 6.75 ms an exchange, 1 device on the "

@@ -250,7 +250,7 @@ class Options(ProgramTest):
         self.assertEqual(refused, ["rendering"])
 
     def test_those_of_the_program_alone_are_refused_and_listed(self):
-        page = (SOURCE / "docs/python.md").read_text()
+        page = (SOURCE / "docs/how_to/python.md").read_text()
         for name, (value, words) in REFUSED.items():
             with self.subTest(name), self.assertRaisesRegex(proxarm.SetupError, f"^--{name}: found .*{words}"):
                 proxarm.Session(**{name.replace("-", "_"): value})

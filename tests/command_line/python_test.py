@@ -342,7 +342,7 @@ class Around(ProgramTest):
         self.assertEqual(study.table["kind"][0], "objects")
 
     def test_the_examples_of_the_page_are_the_files_and_run(self):
-        page = (SOURCE / "docs/python.md").read_text()
+        page = (SOURCE / "docs/how_to/python.md").read_text()
         blocks = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
         for name, expected in (("figure5.py", r"\(5\): pulls with 0\.421 N, kicks with 0\.313 N"), ("torus.py", r"^[1-9]\.\d\d s of touch; .* x = 0\.9\d\d\d m")):
             file = SOURCE / "docs/examples" / name

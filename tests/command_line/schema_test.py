@@ -153,7 +153,7 @@ class Schema(ProgramTest):
         return said
 
     def test_what_is_shipped_is_what_is_printed(self):
-        page = (SOURCE / "docs/keys.md").read_text()
+        page = (SOURCE / "docs/reference/keys.md").read_text()
         for kind in KINDS:
             with self.subTest(kind=kind):
                 self.assertEqual(self.call("schema", kind).out, (SOURCE / f"models/schema/{kind}.json").read_text(),
@@ -180,7 +180,7 @@ class Schema(ProgramTest):
 
     def test_examples_in_the_docs_fit(self):
         fitting = 0
-        for page in (SOURCE / "docs").glob("*.md"):
+        for page in (SOURCE / "docs").rglob("*.md"):
             for block in re.findall(r"^```yaml\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL):
                 if "…" in block:
                     continue  # one line of a file

@@ -44,7 +44,7 @@ class Study(ProgramTest):
         along = figures["apparent_mass_error_by_direction"][ahead]
         self.assertEqual(set(along), {"x", "y", "z"})
         # What the project has promised: along x all of it, in the worst direction up to 5 Hz. There, at 10 Hz it is the
-        # gears' give, 26 % in docs/studies.md.
+        # gears' give, 26 % in docs/results/studies.md.
         for frequency, along_x, at_worst in (("2", 0.02, 0.02), ("5", 0.07, 0.07), ("10", 0.2, 0.27)):
             self.assertLessEqual(along["x"][frequency], along_x)
             self.assertLessEqual(by_setup[ahead][frequency], at_worst)

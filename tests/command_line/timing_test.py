@@ -61,7 +61,7 @@ tool:
 
 
 def slowness():
-    """How much longer a fixed piece of arithmetic takes than on the machine that docs/studies.md has its figures from.
+    """How much longer a fixed piece of arithmetic takes than on the machine that docs/results/studies.md has its figures from.
 
     Its median over 0.2 s, so that it shows the processor and not who else runs."""
     def chunk_ns():
@@ -110,7 +110,7 @@ class Timing(ProgramTest):
 
     def test_with_a_box_tool_among_ten_objects_it_takes_at_most_100(self):
         """Whole cycles of a session that touches and slides most of the time; where the tool is jammed, steps take longer
-        (docs/studies.md)."""
+        (docs/results/studies.md)."""
         scene = self.written("ten.yaml", TEN_OBJECTS)
         measured = []
         for _ in range(3):

@@ -7,7 +7,7 @@ import unittest
 import harness
 
 LINK = re.compile(r"\]\(((?!https?:|#)[^)#]+)(?:#[^)]*)?\)")
-DOCUMENTS = [harness.SOURCE / "README.md", harness.SOURCE / "CHANGELOG.md", *sorted((harness.SOURCE / "docs").glob("*.md"))]
+DOCUMENTS = [harness.SOURCE / "README.md", harness.SOURCE / "CHANGELOG.md", *sorted((harness.SOURCE / "docs").rglob("*.md"))]
 
 
 class Tour(unittest.TestCase):

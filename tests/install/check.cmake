@@ -53,7 +53,7 @@ run(${CMAKE_COMMAND} --build ${folder}/own_world)
 run(${folder}/own_world/own_world)
 message(STATUS "${output}")
 
-# The installed examples of docs/library.md, with the installed data.
+# The installed examples of docs/how_to/library.md, with the installed data.
 run(${CMAKE_COMMAND} -G Ninja -S ${folder}/prefix/share/doc/proxarm/docs/examples -B ${folder}/examples
     -D CMAKE_PREFIX_PATH=${folder}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_BUILD_TYPE=Debug)
 run(${CMAKE_COMMAND} --build ${folder}/examples)

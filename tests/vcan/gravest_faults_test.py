@@ -1,5 +1,5 @@
 """The gravest faults one after the other on a real vcan, the simulated arm as its own process: the message, how many
-cycles until the reaction, how far the tool moves until it stands. Prints a table for docs/buses.md."""
+cycles until the reaction, how far the tool moves until it stands. Prints a table for docs/reference/buses.md."""
 import csv
 import json
 import math

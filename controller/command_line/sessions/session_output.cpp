@@ -65,7 +65,7 @@ SessionOutput::SessionOutput(const controller::PreparedSession& session, const c
 namespace {
 // Warns if the setpoints may make the gears ring. The stability check doesn't see this ringing.
 void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
-  constexpr double most_modes = 3.0;  // measured (docs/studies.md)
+  constexpr double most_modes = 3.0;  // measured (docs/results/studies.md)
   const double bandwidth_Hz = cell.limits.setpoint_bandwidth_Hz;
   if (!(bandwidth_Hz >= most_modes * mode_Hz)) return;
   std::fprintf(

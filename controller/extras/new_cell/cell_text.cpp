@@ -146,8 +146,9 @@ std::string commented(const std::string& text) {
 std::string cell_text(const description::Cell& cell, const std::vector<std::string>& remarks, bool with_scene,
                       const std::string& sensor_keys) {
   std::string text =
-      "# Made by proxarm new-cell. Keys: docs/files.md. What is estimated runs in simulation; before a real arm "
-      "moves,\n# put in what its data sheets say, and see docs/safety.md.\n";
+      "# Made by proxarm new-cell. Keys: docs/reference/files.md. What is estimated runs in simulation; before a real "
+      "arm "
+      "moves,\n# put in what its data sheets say, and see docs/explanation/safety.md.\n";
   for (const std::string& remark : remarks) text += commented("- " + remark);
   text += "name: " + scalar(cell.name) +
           "\nurdf: arm.urdf\n\n# Where the base is in the world, and which way is down.\nbase_W: " + pose(cell.base_W) +

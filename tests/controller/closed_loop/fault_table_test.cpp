@@ -1,6 +1,6 @@
 // Every row of the fault table (controller/supervision/fault.cpp) in the closed loop on the in-process bus: the
 // reaction, how soon it comes, how far the tool moves until it is at rest, and what is said. Prints the table that
-// docs/buses.md shows.
+// docs/reference/buses.md shows.
 #include <gtest/gtest.h>
 
 #include <algorithm>

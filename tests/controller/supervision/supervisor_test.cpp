@@ -215,7 +215,7 @@ std::vector<std::string> cells_of(const std::string& line) {
 }
 
 std::vector<std::vector<std::string>> table_in_docs(const std::string& head) {
-  std::ifstream file(proxarm::source_file("docs/supervision.md"));
+  std::ifstream file(proxarm::source_file("docs/reference/supervision.md"));
   std::vector<std::vector<std::string>> rows;
   bool inside = false;
   for (std::string line; std::getline(file, line);) {
@@ -226,7 +226,8 @@ std::vector<std::vector<std::string>> table_in_docs(const std::string& head) {
   return rows;
 }
 
-// docs/supervision.md shows the table of transitions row by row, and the reactions of all faults with their choices.
+// docs/reference/supervision.md shows the table of transitions row by row, and the reactions of all faults with their
+// choices.
 TEST(Supervisor, IsAsTheDocumentationSays) {
   const auto rows = table_in_docs("| from |");
   ASSERT_EQ(rows.size(), transitions().size());

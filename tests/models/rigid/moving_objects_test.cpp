@@ -645,7 +645,7 @@ TEST(MovingRigidObjects, AMeshThatMovesKeepsTheLawInItsOwnFrame) {
     }
     held.arrive(q);
   }
-  // On four corners, where some stick and others slip: some in a hundred, as where nothing moves (docs/tool.md).
+  // On four corners, where some stick and others slip: some in a hundred, as where nothing moves (docs/how_to/tool.md).
   EXPECT_LE(unresolved, 10);
   EXPECT_GT(touching, 400);
   EXPECT_GT(sliding, 50);

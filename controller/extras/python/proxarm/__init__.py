@@ -1,4 +1,4 @@
-"""proxarm from Python: worlds, simulated sessions, records, studies, and sessions that run (docs/python.md).
+"""proxarm from Python: worlds, simulated sessions, records, studies, and sessions that run (docs/how_to/python.md).
 
 A simulated session takes a world and a hand that are Python functions. A real one is `proxarm run`, a process of its
 own, which `run` starts and `Live` talks to: no interpreter is ever in its cycle.
@@ -73,7 +73,7 @@ class Signals(collections.abc.Mapping):
 
 class Result:
     """What a simulated session gives: `summary`, a dict as `proxarm run --json` prints it, its `signals`, a row for each
-    cycle, and its `contacts`, a row for each contact of each cycle (docs/files.md), both as Signals; `objects` are the
+    cycle, and its `contacts`, a row for each contact of each cycle (docs/reference/files.md), both as Signals; `objects` are the
     names of those that contacts have by number."""
 
     def __init__(self, summary, signals, contacts, objects):
@@ -212,7 +212,7 @@ def load(folder, columns=None, keep=True):
 
 
 class _Table:
-    """signals.bin or contacts.bin (docs/files.md), mapped into memory: a column is read when somebody asks for it. Of a
+    """signals.bin or contacts.bin (docs/reference/files.md), mapped into memory: a column is read when somebody asks for it. Of a
     packed one the wanted columns are unpacked at once."""
 
     def __init__(self, file):

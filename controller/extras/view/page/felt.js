@@ -1,7 +1,7 @@
 // Two diagrams of what the hand felt and what was meant, over the time that the plots show. First, in free motion: the
 // hand's force over the tool's acceleration, and the line of the wanted mass. Second, in contact: the contact force
 // over the tool's depth, and the line that the scene means. The shaded ground is the range that hands can't tell from
-// the line (docs/view.md has the sources).
+// the line (docs/how_to/view.md has the sources).
 import { PHASE_RENDERING, vector } from './connection.js';
 import { colour, dash, onTheme } from './theme.js';
 

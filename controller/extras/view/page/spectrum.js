@@ -1,5 +1,5 @@
 // The handle's vibration and the amplitudes that a hand just notices: third-octave bands of the last second, on two
-// logarithmic axes (docs/view.md has the sources).
+// logarithmic axes (docs/how_to/view.md has the sources).
 import { colour, dash, onTheme } from './theme.js';
 
 const LEFT = 34, RIGHT = 6, TOP = 18, BOTTOM = 16;
