@@ -1,5 +1,6 @@
 """Commands and YAML blocks of the README and of docs/ do what they say."""
 import re
+import subprocess
 import unittest
 
 from harness import SOURCE, ProgramTest
@@ -39,8 +40,18 @@ def commands():
 
 
 class Docs(ProgramTest):
+    def write_files(self):
+        """The files that a page asks its reader to write: blocks whose first line is a comment with the name alone."""
+        for language in ("yaml", "python"):
+            for _, text in blocks(language):
+                if named := re.match(r"# (\w+\.(?:yaml|py))\n", text):
+                    file = self.written(named[1], text)
+                    if language == "python":
+                        subprocess.run(["/usr/bin/python3", file], cwd=self.folder, check=True)
+
     def test_every_command_runs(self):
         met, ran = set(), 0
+        self.write_files()
         for page, words, said in commands():
             with self.subTest(page=page, command=words):
                 exception = next((key for key in ELSEWHERE if key in f"proxarm {words} "), None)
@@ -58,6 +69,7 @@ class Docs(ProgramTest):
     def test_every_scene_and_hand_is_fine(self):
         # The only complete scene of scenes.md was refused.
         checked = 0
+        self.write_files()
         for page, text in blocks("yaml"):
             if not re.search(r"^(objects|waypoints):( *#.*)?$", text, re.MULTILINE) or any(part in text for part in PARTS):
                 continue

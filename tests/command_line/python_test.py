@@ -353,6 +353,16 @@ class Around(ProgramTest):
             self.assertRegex(done.stdout, expected)
         self.assertEqual(json.loads((self.folder / "figure5/figure5.json").read_text())["pull_force_N"]["23"], 0.0)
 
+    def test_the_first_hour_prints_what_its_page_shows(self):
+        page = (SOURCE / "docs/tutorial/first_python.md").read_text()
+        blocks = re.findall(r"^```python\n(.*?)^```$\n+(?:```text\n(.*?)^```$)?", page, re.MULTILINE | re.DOTALL)
+        self.assertGreater(len(blocks), 8)
+        script = "print('--')\n".join(code for code, _ in blocks)
+        done = subprocess.run(["/usr/bin/python3", self.written("first_hour.py", script)], cwd=self.folder, text=True,
+                              capture_output=True, env={**os.environ, "PYTHONPATH": str(PACKAGE)})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stdout.split("--\n"), [shown for _, shown in blocks])
+
 
 class CallTiming(unittest.TestCase):
     def test_a_step_costs_a_microsecond_more_than_a_bare_call(self):
