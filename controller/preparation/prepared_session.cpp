@@ -170,7 +170,12 @@ void require_renderable_tool(PreparedSession& session) {
   if (session.settings.order != 1) {
     refuse("--order", "2", "1: order 2 needs the contacts of the step before, which a pose's aren't labelled with");
   }
-  if (session.settings.looks_ahead) refuse("--lookahead", "a lookahead", "off: only a point's way is predicted");
+  if (session.settings.looks_ahead && session.settings.orientation == OrientationMode::free) {
+    refuse(
+        "--lookahead", "--orientation free",
+        "--lookahead off, or --orientation held: the place of a tool that pivots on a contact would be predicted, but "
+        "not its turn");
+  }
   const std::size_t axes = session.cell.drives.size();
   if (axes < 6) {
     refuse("--tool", std::to_string(axes) + " axes", "six axes or more: fewer can't hold an orientation");

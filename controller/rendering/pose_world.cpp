@@ -38,11 +38,26 @@ PoseWorld::PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, scenes::CompiledS
                      const PoseWorldConfig& config)
     : config_(config),
       g_(std::move(g)),
-      changes_(scene, config.proxy.period_s),
+      changes_(with_setters(scene), config.proxy.period_s),
       limits_(no_world_),
       proxy_(config_.proxy, *g_),
       damping_Ns_per_m_(config_.proxy.damping_Ns_per_m),
-      turning_damping_Nms_per_rad_(config_.proxy.turning_damping_Nms_per_rad) {}
+      turning_damping_Nms_per_rad_(config_.proxy.turning_damping_Nms_per_rad) {
+  if (config.looks_ahead) ahead_ = std::make_unique<PoseLookahead>(*g_);
+}
+
+// Redirects the scene's setters of friction and motion from the point's 𝒢 to the tool's.
+scenes::CompiledScene& PoseWorld::with_setters(scenes::CompiledScene& scene) {
+  scene.friction_setters.clear();
+  for (std::int32_t object = 0; static_cast<std::size_t>(object) < scene.frictions.size(); ++object) {
+    scene.friction_setters.emplace_back(object, [this, object](double friction) {
+      g_->set_friction(object, friction);
+      if (ahead_) ahead_->set_friction(object, friction);
+    });
+  }
+  scene.also_drive = [this](std::int32_t object, const models::Pose& X) { g_->drive(object, X); };
+  return scene;
+}
 
 void PoseWorld::turn_to(const Eigen::Quaterniond& R_WT, const Vec3& omega_W) noexcept {
   R_WT_ = R_WT;

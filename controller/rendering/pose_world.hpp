@@ -26,6 +26,7 @@
 #include "controller/limits/limited_algorithm.hpp"
 #include "controller/proxies/pose_proxy.hpp"
 #include "controller/proxies/turn_sets.hpp"
+#include "controller/rendering/pose_lookahead.hpp"
 #include "controller/rendering/rendered_world.hpp"
 #include "controller/rendering/scene_changes.hpp"
 #include "models/arm/tool_inertia.hpp"
@@ -37,6 +38,7 @@ namespace proxarm::controller {
 struct PoseWorldConfig {
   PoseConfig proxy;
   TurnSets turn{};  // angles count from the orientation at the first start
+  bool looks_ahead = false;
 };
 
 class PoseWorld final : public RenderedWorld {
@@ -67,9 +69,9 @@ class PoseWorld final : public RenderedWorld {
 
   void start(const models::Vec3& q_W) noexcept override;
   WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept override;
-  models::Vec3 look_ahead(const models::Vec3& /*h_W*/, const StepLimits& /*limits*/,
-                          double /*horizon_s*/) noexcept override {
-    return proxy_.q().position;
+  // Precondition: h_W is 0.
+  models::Vec3 look_ahead(const models::Vec3& /*h_W*/, const StepLimits& limits, double horizon_s) noexcept override {
+    return ahead_ && horizon_s > 0.0 ? (*ahead_)(proxy_, limits, horizon_s) : proxy_.q().position;
   }
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept override;
   void set(const Change& change) noexcept override;
@@ -83,6 +85,7 @@ class PoseWorld final : public RenderedWorld {
   void archive(fieldbus::StateArchive& state) noexcept override;
 
  private:
+  scenes::CompiledScene& with_setters(scenes::CompiledScene& scene);
   [[nodiscard]] models::ToolPose outside(const models::ToolPose& wanted) noexcept;
   void limit_place(const StepLimits& limits, models::ToolPose& p_hat) noexcept;
   void hold_rotation(const models::ToolPose& p_hat) noexcept;
@@ -97,6 +100,7 @@ class PoseWorld final : public RenderedWorld {
   models::FreeSpace<3> no_world_;
   LimitedAlgorithm<3> limits_;
   PoseProxy proxy_;
+  std::unique_ptr<PoseLookahead> ahead_;  // null: no lookahead
   Touches touches_;
   WorldStep last_;                               // last_.touches refers to touches_
   models::Twist walls_ = models::Twist::Zero();  // the walls' wrench in the last step

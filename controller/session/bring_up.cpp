@@ -213,19 +213,14 @@ PoseWorldConfig pose_config(const description::Cell& cell, const SessionSettings
                   .behind_centre_T_m = behind.centre_T_m,
                   .behind_inertia_T_kg_m2 = behind.about_T_kg_m2};
   config.turn = turn_sets(cell);
+  config.looks_ahead = settings.looks_ahead;
   return config;
 }
 
-// Compiles the tool's 𝒢, and redirects the scene's setters of friction and motion to it.
 std::unique_ptr<PoseWorld> make_pose_world(const description::Cell& cell, scenes::CompiledScene& scene,
                                            const SessionSettings& settings) {
-  std::unique_ptr<models::PoseAlgorithm> g = scenes::compile_rigid(*scene.source, scene.source->tool->shape);
-  scene.friction_setters.clear();
-  for (std::int32_t object = 0; static_cast<std::size_t>(object) < scene.frictions.size(); ++object) {
-    scene.friction_setters.emplace_back(object, [&g = *g, object](double mu) { g.set_friction(object, mu); });
-  }
-  scene.also_drive = [&g = *g](std::int32_t object, const models::Pose& X) { g.drive(object, X); };
-  return std::make_unique<PoseWorld>(std::move(g), scene, pose_config(cell, settings));
+  return std::make_unique<PoseWorld>(scenes::compile_rigid(*scene.source, scene.source->tool->shape), scene,
+                                     pose_config(cell, settings));
 }
 
 std::unique_ptr<RenderedTool> make_tool(const description::Cell& cell, scenes::CompiledScene& scene,

@@ -38,10 +38,10 @@ class Lookahead(ProgramTest):
         with open(self.folder / folder / "signals.csv", newline="") as file:
             return [row for row in csv.DictReader(file) if row["phase"] == "rendering"]
 
-    def errors(self, lookahead, mass_kg):
+    def errors(self, lookahead, mass_kg, tool="point"):
         """|F/a − M|/M by frequency, over the last four seconds: whole periods of all sines."""
         self.summary(self.cell(), "--scene", SOURCE / "scenes/free.yaml", "--hand", self.written("sines.yaml", hand()),
-                     "--mass", mass_kg, "--lookahead", lookahead, "--duration", "20s", "--record", lookahead)
+                     "--mass", mass_kg, "--lookahead", lookahead, "--duration", "20s", "--record", lookahead, "--tool", tool)
         rows = self.rows(lookahead)[-4000:]
         force = [float(row["hand_force_W_x_N"]) for row in rows]
         travel = [float(row["true_tool_W_x_m"]) for row in rows]
@@ -55,6 +55,10 @@ class Lookahead(ProgramTest):
                     self.assertLess(error, most)
                 for error, least in zip(self.errors("off", mass_kg), (0.1, 0.3, 0.6)):
                     self.assertGreater(error, least, "without it a hand feels the delay")
+
+    def test_the_mass_that_is_felt_of_a_tool_with_a_shape(self):
+        for error, most in zip(self.errors("auto", 10, SOURCE / "scenes/tools/rod.yaml"), (0.02, 0.07, 0.20)):
+            self.assertLess(error, most)
 
     def test_the_summary_says_so_by_frequency(self):
         """Held against the coefficient at 5 Hz, by the record; the summary's band is up to half a hertz off it."""

@@ -123,6 +123,7 @@ FROM_THE_MIDDLE = {
     "passivity": ("--passivity", "on", "--hand", "@sim/hands/stiff_grip.yaml"),
     "late sensor": ("--extra-delay", "4ms", "--mass", "8"),
     "lookahead": ("--mass", "10", "--lookahead", "auto"),
+    "lookahead with a rigid tool": ("--scene", "@scenes/box_on_belt.yaml", "--mass", "10", "--lookahead", "auto"),
     "free orientation": ("--orientation", "free"),
     "a tool that swings as it turns": ("--scene", "@scenes/free.yaml", "--hand", "@sim/hands/lean.yaml", "--mass", "2",
                                        "--inertia", "0.005", "--force-unstable", "--extra-delay", "2ms"),

@@ -205,7 +205,8 @@ class RigidTool(ProgramTest):
     def test_what_is_refused(self):
         rod = SCENES / "tools/rod.yaml"
         self.assertIn("order 2", self.refuse("--tool", rod, "--order", "2"))
-        self.assertIn("--lookahead", self.refuse("--tool", rod, "--lookahead", "auto", "--mass", "10"))
+        self.assertIn("--lookahead", self.refuse("--tool", rod, "--lookahead", "auto", "--mass", "10", "--orientation",
+                                                 "free"))
         self.assertIn("impedance", self.refuse(SOURCE / "models/cells/light.yaml", "--tool", rod))
         self.assertIn("six axes", self.refuse(SOURCE / "models/cells/scara.yaml", "--tool", rod))
         self.assertIn("has a layer", self.refuse("--tool", rod, "--scene", SCENES / "soft_wall.yaml"))
