@@ -51,6 +51,9 @@ const char* const kUntouched = "nothing was touched";
 // Returns a text for people: what the scene is, or kUntouched if no object was touched. Returns null if the scene is
 // wrong.
 const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& options) {
+  if (const double deepest_m = scenes::deepest_push_m(scene, options); deepest_m < options.deepest_m) {
+    std::printf("states push at most %.3g mm deep, a tenth of the least radius\n", 1e3 * deepest_m);
+  }
   auto worst = scenes::CheckVerdict::fine;
   for (const scenes::CheckReport& report : scenes::check_scene(scene, options)) {
     std::fputs(report.text().c_str(), stdout);
@@ -141,6 +144,8 @@ void check_cell(const fs::path& file, const fs::path& scene) {
   tell(controller::surprises(session));
   controller::require_runnable(session, run);
   require_simulable(session);
+  const models::Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
+  std::printf("the tool starts at [%.4g, %.4g, %.4g] m\n", start_W.x(), start_W.y(), start_W.z());
   std::vector<fieldbus::DriveSlot> slots;
   for (fieldbus::ServoDrive& servo : servos) slots.push_back({&servo, 0});
   tell(fieldbus::losses_of(slots));

@@ -326,7 +326,9 @@ std::string ask_control_socket(const fs::path& path, const std::string& line) {
                                : nobody ? "a socket whose session has ended"
                                         : error.message(),
                       .expected = "a session that listens there",
-                      .advice = "start it with `proxarm run --control " + path.string() + "`"});
+                      .advice = "start it with `proxarm run --control " +
+                                (path == default_control_path() ? "default" : path.string()) +
+                                "`, with --pace realtime if it is simulated: else it is over in a moment"});
   }
   socket.non_blocking(false);
   boost::asio::write(socket, boost::asio::buffer(line + "\n"), error);

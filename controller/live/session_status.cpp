@@ -8,6 +8,7 @@
 
 #include "controller/preparation/session_loops.hpp"
 #include "controller/supervision/fault.hpp"
+#include "models/base/text.hpp"
 #include "models/files/json.hpp"
 
 namespace proxarm::controller {
@@ -36,7 +37,9 @@ std::optional<Status> present(const BoxReader& box, const PreparedSession& sessi
   const CycleRecord& record = status.record = now->record;
   status.rendered_s = 1e-9 * static_cast<double>(now->rendered_ns);
   status.delay_s = total_delay_s(session);
-  status.felt_mass_kg = record.proxy_mass_kg + record.tool_mass_kg;
+  // Where nothing is rendered, as in a hold, the record has no proxy's mass.
+  const bool renders = record.proxy_mass_kg > 0.0;
+  status.felt_mass_kg = renders ? record.proxy_mass_kg + record.tool_mass_kg : 0.0;
   status.damping_Ns_per_m = record.proxy_damping_Ns_per_m + record.added_damping_Ns_per_m;
   const std::uint64_t back = std::min(speed_cycles, status.cycles - 1);
   if (back > 0 && box.read(status.cycles - 1 - back, *before)) {
@@ -68,7 +71,7 @@ std::string as_json(const std::optional<Status>& status, const PreparedSession& 
   json["rendered_s"] = status->rendered_s;
   json["timestep_s"] = 1e-9 * static_cast<double>(record.period_ns);
   json["delay_s"] = status->delay_s;
-  json["felt_mass_kg"] = status->felt_mass_kg;
+  json["felt_mass_kg"] = status->felt_mass_kg > 0.0 ? Json(status->felt_mass_kg) : Json();
   json["damping_Ns_per_m"] = status->damping_Ns_per_m;
   json["force_W_N"] = list_of(record.force_W_N);
   json["force_N"] = vec3(record.force_W_N).norm();
@@ -89,9 +92,11 @@ std::string as_text(const std::optional<Status>& status) {
   if (record.fault != Fault::none) text += std::string(" (") + fault_name(record.fault) + ")";
   if (record.held_for != Fault::none) text += std::string(", held for ") + fault_name(record.held_for);
   std::array<char, 200> figures{};
-  std::snprintf(figures.data(), figures.size(),
-                ": %.1f s rendered, %.3g N, %.3f m/s, %.3g kg, T %.4g ms, delay %.3g ms", status->rendered_s,
-                vec3(record.force_W_N).norm(), status->tool_speed_m_per_s, status->felt_mass_kg,
+  std::snprintf(figures.data(), figures.size(), ": %.1f s rendered, %.3g N, %.3f m/s, ", status->rendered_s,
+                vec3(record.force_W_N).norm(), status->tool_speed_m_per_s);
+  text += figures.data();
+  if (status->felt_mass_kg > 0.0) text += description::rounded_text(status->felt_mass_kg) + " kg, ";
+  std::snprintf(figures.data(), figures.size(), "T %.4g ms, delay %.3g ms",
                 1e-6 * static_cast<double>(record.period_ns), 1e3 * status->delay_s);
   text += figures.data();
   if (!status->touches.empty()) text += ", touches " + status->touches;

@@ -407,9 +407,13 @@ double least_radius_m(const Scene& scene) {
 
 }  // namespace
 
+double deepest_push_m(const Scene& scene, const CheckOptions& options) {
+  return std::min(options.deepest_m, 0.1 * least_radius_m(scene));
+}
+
 std::vector<CheckReport> check_scene(const Scene& scene, const CheckOptions& given) {
   CheckOptions options = given;
-  options.deepest_m = std::min(options.deepest_m, 0.1 * least_radius_m(scene));
+  options.deepest_m = deepest_push_m(scene, given);
   std::vector<CheckReport> reports;
   Random random(options.seed);
   std::vector<Vec3> all;

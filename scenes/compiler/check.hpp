@@ -90,6 +90,9 @@ extern template CheckReport check_algorithm<2>(models::GeometricAlgorithm<2>&, c
 extern template CheckReport check_algorithm<3>(models::GeometricAlgorithm<3>&, const CheckRegion<3>&,
                                                const CheckOptions&);
 
+// Returns how deep the states of a scene's check push, m: at most options.deepest_m and a tenth of the least radius.
+double deepest_push_m(const Scene& scene, const CheckOptions& options);
+
 // If the scene has several objects, checks each object alone and then all objects together. Moving objects are checked
 // at rest, at time 0.
 std::vector<CheckReport> check_scene(const Scene& scene, const CheckOptions& options = {});
