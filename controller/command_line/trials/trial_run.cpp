@@ -91,7 +91,8 @@ class TrialArm {
       return far_end_.modbus_client(line.name);
     };
     controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings,
-                                                           network_, buses_in_order(session.cell), open_line);
+                                                           network_, buses_in_order(session.cell), open_line,
+                                                           [this](const auto&) { return far_end_.datagram_port(); });
     controller::bring_up(parts,
                          [this](fieldbus::ModbusLine& line) { controller::pump(network_, line, network_.now_ns()); });
     controller::Cycle cycle(std::move(parts), session.settings, session.cell.limits, 64);
