@@ -24,7 +24,7 @@ int plan_command(const RunOptions& options) {
     std::printf("%s", fieldbus::plan_text(plan).c_str());
     all_fit = all_fit && plan.fits;
   }
-  std::printf("%s", modbus_plan_text(session).c_str());
+  std::printf("%s", (modbus_plan_text(session) + udp_plan_text(session)).c_str());
   return all_fit ? 0 : not_carried;
 }
 

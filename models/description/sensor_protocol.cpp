@@ -122,13 +122,16 @@ struct Reader {
 
   // Reads the place of a number. Throws SetupError unless the number is within the first `within` bytes.
   [[nodiscard]] NumberField read_number(const YamlNode& node, std::size_t within) const {
+    if (!node.has("signal")) return read_place(node, within);
+    std::size_t at = 0;
+    NumberField number = find_signal(node, at)->number;
+    number.byte += at;
+    return number;
+  }
+
+  // Does what read_number() does, for a number that has no signal in a DBC file.
+  [[nodiscard]] NumberField read_place(const YamlNode& node, std::size_t within) const {
     NumberField number;
-    if (node.has("signal")) {
-      std::size_t at = 0;
-      number = find_signal(node, at)->number;
-      number.byte += at;
-      return number;
-    }
     if (protocol.registers) {
       const std::int64_t first = protocol.registers->at, last = first + protocol.registers->count - 1;
       within = 2 * static_cast<std::size_t>(protocol.registers->count);  // the frame may be longer than the registers
@@ -177,16 +180,18 @@ struct Reader {
     return static_cast<std::uint32_t>(number_of(id, 0, protocol.extended ? 0x1FFFFFFF : 0x7FF));
   }
 
-  [[nodiscard]] std::vector<std::uint8_t> read_bytes(const YamlNode& node, std::string_view key,
-                                                     std::size_t most) const {
+  [[nodiscard]] std::vector<std::uint8_t> read_bytes(const YamlNode& node, std::string_view key, std::size_t most,
+                                                     std::size_t least = 0) const {
     std::vector<std::uint8_t> bytes;
-    for (const YamlNode& item : node.list(key, 0, most)) {
+    for (const YamlNode& item : node.list(key, least, most)) {
       bytes.push_back(static_cast<std::uint8_t>(number_of(item, 0, 255)));
     }
     return bytes;
   }
 
   void read_format() {
+    big_endian = read_order(root, true);
+    if (root.has("datagrams")) return;  // these keys are those of CAN frames
     if (const auto format = root.find_map("format")) {
       protocol.extended = format->boolean_or("extended", false);
       protocol.fd = format->boolean_or("fd", false);
@@ -199,7 +204,6 @@ struct Reader {
       protocol.base_id_max = static_cast<std::uint32_t>(base->integer("max", protocol.base_id_min, 0x1FFFFFFF));
       protocol.base_id_step = static_cast<std::uint32_t>(base->integer_or("step", 1, 1, 0x1000000));
     }
-    big_endian = read_order(root, true);
     if (root.has("dbc")) dbc = load_dbc(protocol.dbc = root.existing_file("dbc"));
   }
 
@@ -410,8 +414,7 @@ struct Reader {
   [[nodiscard]] SensorCommand read_datagram(const YamlNode& node) const {
     SensorCommand command;
     command.id = 1;
-    command.data = read_bytes(node, "data", 64);
-    if (command.data.empty()) throw node.error_at("data", "the bytes of a datagram");
+    command.data = read_bytes(node, "data", 64, 1);
     return command;
   }
 
@@ -530,7 +533,7 @@ SensorProtocol read_sensor_protocol(const YamlNode& root, const SensorChoices& c
     }
   }
   if (const auto node = protocol.datagrams ? root.find_map("reading_counter") : std::nullopt) {
-    protocol.reading_counter = reader.read_number(*node, protocol.sample_bytes());
+    protocol.reading_counter = reader.read_place(*node, protocol.sample_bytes());
   }
   reader.read_status();
   reader.read_checksum();
