@@ -180,9 +180,9 @@ TEST_F(NetFt, TakesNothingFromAFlood) {
 
 TEST_F(NetFt, AllocatesNothingInACycle) {
   wire.put(datagram(1), now_ns);
-  const std::size_t before = allocation_count();
+  const std::size_t before = tests::allocation_count();
   sensor.poll(now_ns, unused);
-  EXPECT_EQ(allocation_count(), before);
+  EXPECT_EQ(tests::allocation_count(), before);
   EXPECT_TRUE(sensor.fresh());
 }
 
