@@ -377,8 +377,7 @@ DatagramOpener opener_of(fieldbus::UdpPeers peers) {
 
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
-                       const BusIndices& bus_indices, const ModbusOpener& open_line,
-                       const DatagramOpener& open_port) {
+                       const BusIndices& bus_indices, const ModbusOpener& open_line, const DatagramOpener& open_port) {
   require_scheme(cell, settings);
   Drives drives = make_drives(cell, settings, bus_indices);
   Sensor force_sensor = build_sensor(cell, sensor, open_port);

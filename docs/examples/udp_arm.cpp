@@ -86,9 +86,9 @@ class ArmLink {
     close(socket_);
   }
 
-  // Once a cycle, from the first joint's drive: sends what all joints were set to in the last one, and takes the answer.
-  // The session's time is virtual, and waits here: for the clock of the machine, then for an answer that is late on a
-  // busy machine. Without an answer it goes on, and waits no more until one comes. A real loop never waits.
+  // Once a cycle, from the first joint's drive: sends what all joints were set to in the last one, and takes the
+  // answer. The session's time is virtual, and waits here: for the clock of the machine, then for an answer that is
+  // late on a busy machine. Without an answer it goes on, and waits no more until one comes. A real loop never waits.
   void exchange(std::int64_t now_ns) noexcept {
     if (!begun_) begun_ = Clock::now() - std::chrono::nanoseconds(now_ns);
     std::this_thread::sleep_until(*begun_ + std::chrono::nanoseconds(now_ns));
@@ -180,7 +180,7 @@ class UdpDrive final : public fieldbus::CyclicDrive {
     if (axis_ == 0) link_.exchange(now_ns);
     if (link_.missed() > 0) return;
     actual_rad_ = link_.answer().q_rad[axis_];
-    if (goal_ == DriveGoal::operation_enabled && link_.state() == ArmState::fault) fault_ = fieldbus::DriveFault::state_fault;
+    judge_state();
     // Until the arm follows, its setpoint is where it is: so the first one that counts is no jump.
     if (!following()) link_.target_rad[axis_] = actual_rad_;
     // The simulated arm, with its hand and its force sensor, goes with the controller's joints.
@@ -189,7 +189,10 @@ class UdpDrive final : public fieldbus::CyclicDrive {
     if (counts && arm_.servo(axis_).powered()) arm_.servo(axis_).set_target(*counts, now_ns);
   }
 
-  void request(DriveGoal goal) noexcept override { link_.request(goal_ = goal); }
+  void request(DriveGoal goal) noexcept override {
+    if (goal != goal_) has_followed_ = false;
+    link_.request(goal_ = goal);
+  }
   bool set_target_rad(double angle_rad) noexcept override {
     if (!following() || !scale_.counts(angle_rad)) return false;
     link_.target_rad[axis_] = angle_rad;
@@ -221,9 +224,21 @@ class UdpDrive final : public fieldbus::CyclicDrive {
   [[nodiscard]] const proxarm::description::DriveDescription& description() const noexcept override {
     return description_;
   }
-  void archive(fieldbus::StateArchive& state) noexcept override { state(goal_, fault_, actual_rad_); }
+  void archive(fieldbus::StateArchive& state) noexcept override { state(goal_, fault_, has_followed_, actual_rad_); }
 
  private:
+  // An arm that stops by itself, as by its watchdog, is a fault: else the session would wait for it, and it could move
+  // again by itself.
+  void judge_state() noexcept {
+    if (following()) has_followed_ = true;
+    if (goal_ != DriveGoal::operation_enabled || fault_ != fieldbus::DriveFault::none) return;
+    if (link_.state() == ArmState::fault) {
+      fault_ = fieldbus::DriveFault::state_fault;
+    } else if (has_followed_ && !following()) {
+      fault_ = fieldbus::DriveFault::left_operation;
+    }
+  }
+
   ArmLink& link_;
   proxarm::sim::Plant& arm_;
   std::size_t axis_;
@@ -231,6 +246,7 @@ class UdpDrive final : public fieldbus::CyclicDrive {
   fieldbus::CountScale scale_;
   DriveGoal goal_ = DriveGoal::none;
   fieldbus::DriveFault fault_ = fieldbus::DriveFault::none;
+  bool has_followed_ = false;  // since the goal is operation
   double actual_rad_ = 0.0;
 };
 

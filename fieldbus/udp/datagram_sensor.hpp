@@ -8,9 +8,9 @@
 //                                            ◀──    36 bytes, rate_Hz times a second
 //     12 34 00 00 00 00 00 00  (stop)        ──▶    at the end
 //
-// The cycle thread reads the port without waiting, once at the beginning of each cycle. The newest datagram of the right
-// length becomes the cycle's sample. Older ones, and those out of order or repeated, are counted and dropped. A reading
-// is up to one period of the stream old when the cycle begins, which the stability check counts.
+// The cycle thread reads the port without waiting, once at the beginning of each cycle. The newest datagram of the
+// right length becomes the cycle's sample. Older ones, and those out of order or repeated, are counted and dropped. A
+// reading is up to one period of the stream old when the cycle begins, which the stability check counts.
 #pragma once
 
 #include <memory>
@@ -79,8 +79,8 @@ class DatagramSensor final : public ForceSensor {
   DatagramSequence sequence_;
   Datagram read_, newest_;
   bool started_ = false;
-  bool took_ = false;       // newest_ came in this cycle
-  bool restored_ = false;   // newest_ was read from an archive, for the next poll()
+  bool took_ = false;      // newest_ came in this cycle
+  bool restored_ = false;  // newest_ was read from an archive, for the next poll()
   std::uint64_t floods_ = 0;
 };
 

@@ -27,8 +27,8 @@ class DatagramSequence {
       : bytes_(protocol.sample_bytes()), counter_(protocol.counter) {}
 
   // Returns whether the datagram has the right length and is newer than all before it. A number that is less than half
-  // of the counter's range ahead is newer. A sensor that was restarted counts from any number, so a second datagram in a
-  // row that isn't newer begins a new sequence, unless it repeats a number.
+  // of the counter's range ahead is newer. A sensor that was restarted counts from any number, so a second datagram in
+  // a row that isn't newer begins a new sequence, unless it repeats a number.
   bool accept(std::span<const std::uint8_t> datagram) noexcept;
   // Forgets the last number: the next datagram of the right length is accepted.
   void restart() noexcept { begun_ = false; }

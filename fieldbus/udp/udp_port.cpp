@@ -98,8 +98,8 @@ class UdpPort final : public DatagramPort {
   }
 
  private:
-  // Returns the datagram's age by CLOCK_REALTIME, subtracted from the present CLOCK_MONOTONIC. Without a time stamp, the
-  // datagram counts as received at now_ns.
+  // Returns the datagram's age by CLOCK_REALTIME, subtracted from the present CLOCK_MONOTONIC. Without a time stamp,
+  // the datagram counts as received at now_ns.
   static std::int64_t stamp(msghdr& message, std::int64_t now_ns) noexcept {
     for (cmsghdr* control = CMSG_FIRSTHDR(&message); control != nullptr; control = CMSG_NXTHDR(&message, control)) {
       if (control->cmsg_level != SOL_SOCKET || control->cmsg_type != SO_TIMESTAMPNS) continue;

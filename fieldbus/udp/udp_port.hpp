@@ -2,8 +2,8 @@
 // nobody else.
 //
 // A datagram's time stamp is set by the kernel at reception (SO_TIMESTAMPNS, CLOCK_REALTIME) and converted to
-// CLOCK_MONOTONIC, the clock of SocketCanNetwork. If CLOCK_REALTIME was set in between, the stamp is wrong by that step,
-// but never in the future.
+// CLOCK_MONOTONIC, the clock of SocketCanNetwork. If CLOCK_REALTIME was set in between, the stamp is wrong by that
+// step, but never in the future.
 #pragma once
 
 #include <memory>

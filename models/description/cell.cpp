@@ -84,9 +84,9 @@ BusDescription read_bus(const YamlNode& node) {
 
 // Reads a numeric IPv4 address.
 std::string read_address(const YamlNode& node, std::string_view key) {
-  return text_like(node, key,
-                   {R"(((25[0-5]|2[0-4][0-9]|1[0-9][0-9]|[1-9]?[0-9])(\.(?!$)|$)){4})",
-                    "a numeric address, such as 192.168.0.10"});
+  return text_like(
+      node, key,
+      {R"(((25[0-5]|2[0-4][0-9]|1[0-9][0-9]|[1-9]?[0-9])(\.(?!$)|$)){4})", "a numeric address, such as 192.168.0.10"});
 }
 
 // Reads the address of one device. Addresses of no device (0.x.x.x, and from 224.x.x.x on multicast and broadcast) are

@@ -235,9 +235,9 @@ struct ToolDescription {
 struct SensorPlacement {
   // Absolute path of the sensor's file. In the cell's file, the path is relative to the cell file's folder.
   std::string description;
-  std::string bus;   // name of the CAN bus or the Modbus line; empty for a sensor on UDP
-  std::string host;  // UDP: the sensor's numeric IPv4 address; empty for a sensor on a bus
-  int port = 0;      // UDP: the sensor's port; 0: the port in its file
+  std::string bus;            // name of the CAN bus or the Modbus line; empty for a sensor on UDP
+  std::string host;           // UDP: the sensor's numeric IPv4 address; empty for a sensor on a bus
+  int port = 0;               // UDP: the sensor's port; 0: the port in its file
   std::uint32_t base_id = 0;  // the sensor's file defines how it is used; some sensors have no base id
   SensorChoices choices;      // from the keys settings, force_range_N and torque_range_Nm
   std::string link;           // the link in the URDF that carries the sensor (the flange)

@@ -32,7 +32,8 @@
 // sample:
 //   registers: {at: 180, count: 6, response_timeout_s: 0.05}   # holding registers, numbered from 0; read at rate_Hz
 //   signals: {fx: {register: 180, bits: 16, type: signed, scale: 0.01}, ...}   # bits: 16 (the default) or 32
-// A sensor on UDP has datagrams instead of frames and format; each datagram is one sample. Its commands have data alone:
+// A sensor on UDP has datagrams instead of frames and format; each datagram is one sample. Its commands have data
+// alone:
 //   datagrams: {bytes: 36, port: 49152}          # the sensor's port, if the cell doesn't state another
 //   reading_counter: {byte: 4, bits: 32}         # the number of the reading; the simulated sensor counts it, nothing
 //                                                # judges it

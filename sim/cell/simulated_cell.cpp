@@ -371,8 +371,7 @@ std::size_t SimulatedCell::axis_of(const std::string& joint) const noexcept {
 
 void SimulatedCell::attach_to(fieldbus::SimulatedCanNetwork& network) {
   using fieldbus::NodeFormat;
-  const bool fd_sensor =
-      described_sensor_ && !sensor_registers_ && !sensor_datagrams_ && described_sensor_->fd();
+  const bool fd_sensor = described_sensor_ && !sensor_registers_ && !sensor_datagrams_ && described_sensor_->fd();
   for (const auto& node : nodes_) {
     const auto drive = std::find_if(cell_.drives.begin(), cell_.drives.end(),
                                     [&](const description::DriveDescription& d) { return d.joint == node->name(); });

@@ -43,9 +43,7 @@ bool InProcessPort::Queue::pop(fieldbus::Datagram& out, std::int64_t until_ns) n
 
 bool InProcessPort::send(std::span<const std::uint8_t> bytes) noexcept { return to_device_.push(bytes, 0); }
 
-bool InProcessPort::receive(fieldbus::Datagram& out, std::int64_t now_ns) noexcept {
-  return to_port_.pop(out, now_ns);
-}
+bool InProcessPort::receive(fieldbus::Datagram& out, std::int64_t now_ns) noexcept { return to_port_.pop(out, now_ns); }
 
 void InProcessPort::send(std::span<const std::uint8_t> bytes, std::int64_t ready_ns) noexcept {
   to_port_.push(bytes, ready_ns + on_the_way_ns);

@@ -24,9 +24,10 @@ UdpServer::UdpServer(const std::string& host, int port) {
   socklen_t size = sizeof address;
   if (socket_ < 0 || bind(socket_, reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
       getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
-    const description::SetupError error({.key = "sensor.port",
-                                         .message = "the simulated sensor's UDP port can't be opened",
-                                         .found = host + ", port " + std::to_string(port) + ": " + std::strerror(errno)});
+    const description::SetupError error(
+        {.key = "sensor.port",
+         .message = "the simulated sensor's UDP port can't be opened",
+         .found = host + ", port " + std::to_string(port) + ": " + std::strerror(errno)});
     if (socket_ >= 0) close(socket_);
     throw error;
   }
@@ -42,7 +43,8 @@ void UdpServer::send(std::span<const std::uint8_t> bytes, std::int64_t) noexcept
   peer.sin_port = peer_port_;
   peer.sin_addr.s_addr = peer_host_;
   // If nobody listens there any more, the call fails, and the sensor sends on.
-  (void)sendto(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&peer), sizeof peer);
+  (void)sendto(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&peer),
+               sizeof peer);
 }
 
 bool UdpServer::take(fieldbus::Datagram& request) noexcept {
@@ -50,8 +52,8 @@ bool UdpServer::take(fieldbus::Datagram& request) noexcept {
   // A call can fail by an ICMP message about a sample that was sent before.
   for (int attempt = 0; attempt < 3; ++attempt) {
     socklen_t size = sizeof peer;
-    const ssize_t bytes = recvfrom(socket_, request.data.data(), request.data.size(), 0,
-                                   reinterpret_cast<sockaddr*>(&peer), &size);
+    const ssize_t bytes =
+        recvfrom(socket_, request.data.data(), request.data.size(), 0, reinterpret_cast<sockaddr*>(&peer), &size);
     if (bytes >= 0) {
       request.bytes = static_cast<std::size_t>(bytes);
       peer_host_ = peer.sin_addr.s_addr;

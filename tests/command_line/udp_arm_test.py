@@ -28,14 +28,15 @@ def start_of_the_cell():
     start = [float(x) for x in re.search(r"start_rad: \[(.*?)\]", text)[1].split(",")]
     speeds = [float(x) for x in re.findall(r"max_speed_rad_per_s: ([\d.]+)", text)]
     accelerations = [float(x) for x in re.findall(r"max_acceleration_rad_per_s2: ([\d.]+)", text)]
-    return start, speeds[:6], accelerations[:6]
+    ranges = [tuple(map(float, r.split(","))) for r in re.findall(r"range_rad: \[(.*?)\]", text)]
+    return start, speeds[:6], accelerations[:6], ranges[:6]
 
 
 class Controller:
     """The arm's controller with an ideal arm: its joints are where they were told to be a setpoint ago."""
 
     def __init__(self, start=None):
-        self.q, self.speeds, self.accelerations = start_of_the_cell()
+        self.q, self.speeds, self.accelerations, self.ranges = start_of_the_cell()
         self.q = list(start or self.q)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
@@ -45,6 +46,7 @@ class Controller:
         self.velocity, self.period_s = [0.0] * 6, 0.001
         self.setpoints, self.times, self.mistakes, self.wishes = [], [], [], []
         self.silent_after, self.fault_after, self.ended = math.inf, math.inf, False
+        self.master = None
         self.stopped_at = None  # when it braked by itself
         self.thread = threading.Thread(target=self.serve, daemon=True)
         self.thread.start()
@@ -56,7 +58,14 @@ class Controller:
                 self.take(data, peer)
             if self.state == FOLLOWS and time.monotonic() - self.heard > WATCHDOG_S:
                 self.state, self.stopped_at = STOPS, time.monotonic()
-                self.velocity = [0.0] * 6
+            if self.state == STOPS:
+                self.brake(0.002)
+
+    def brake(self, seconds):
+        """Each joint slows down as hard as it may, and then stands."""
+        for i, speed in enumerate(self.velocity):
+            self.velocity[i] = math.copysign(max(abs(speed) - self.accelerations[i] * seconds, 0.0), speed)
+            self.q[i] += self.velocity[i] * seconds
 
     def refuse(self, what):
         self.mistakes.append(what)
@@ -64,6 +73,9 @@ class Controller:
             self.state = FAULT
 
     def take(self, data, peer):
+        if self.state == FOLLOWS and peer != self.master:
+            return self.refuse(f"a second master, {peer}")
+        self.master = peer
         if len(data) != DATAGRAM.size:
             return self.refuse(f"{len(data)} bytes")
         word, number, wish, period_us, *q = DATAGRAM.unpack(data)
@@ -94,12 +106,14 @@ class Controller:
             return
         for i, (now, before) in enumerate(zip(q, self.q)):
             velocity = (now - before) / self.period_s
+            if not self.ranges[i][0] <= now <= self.ranges[i][1]:
+                return self.refuse(f"joint {i + 1} at {now:.3g} rad")
             if abs(velocity) > self.speeds[i] * 1.01:
                 return self.refuse(f"joint {i + 1} at {velocity:.3g} rad/s")
             if abs(velocity - self.velocity[i]) / self.period_s > self.accelerations[i] * 1.05:
                 return self.refuse(f"joint {i + 1}: {(velocity - self.velocity[i]) / self.period_s:.3g} rad/s2")
         self.velocity = [(now - before) / self.period_s for now, before in zip(q, self.q)]
-        self.q = q
+        self.q = list(q)
         self.setpoints.append(q)
         self.times.append(time.monotonic())
 
@@ -188,6 +202,22 @@ class UdpArm(ProgramTest):
         count = len(controller.setpoints)
         time.sleep(0.2)
         self.assertEqual(len(controller.setpoints), count)
+        self.assertEqual(controller.mistakes, [])
+
+    def test_a_session_that_was_suspended_does_not_go_on_moving(self):
+        controller = Controller()
+        run = self.start(controller, 250, 6)
+        while len(controller.setpoints) < 500 and run.poll() is None:
+            time.sleep(0.01)
+        run.send_signal(signal.SIGSTOP)
+        time.sleep(WATCHDOG_S + 0.3)
+        stands = list(controller.q)
+        run.send_signal(signal.SIGCONT)
+        out, err = run.communicate(timeout=100)
+        self.assertIsNotNone(controller.stopped_at)
+        self.assertEqual(run.returncode, 1, out + err)
+        self.assertIn("FAULT", out)
+        self.assertEqual(controller.q, stands)
         self.assertEqual(controller.mistakes, [])
 
     def test_without_a_controller_there_is_no_session(self):

@@ -54,10 +54,9 @@ ArmOnInterfaces::ArmOnInterfaces(const PreparedSession& session, const RunOption
 }
 
 controller::CycleParts ArmOnInterfaces::brought_up(const PreparedSession& session, scenes::CompiledScene& scene) {
-  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         indices_in(network, interfaces.size()),
-                                                         controller::opener_of(fieldbus::ModbusPeers::any),
-                                                         controller::opener_of(fieldbus::UdpPeers::any));
+  controller::CycleParts parts = controller::build_parts(
+      session.cell, session.sensor, scene, session.settings, network, indices_in(network, interfaces.size()),
+      controller::opener_of(fieldbus::ModbusPeers::any), controller::opener_of(fieldbus::UdpPeers::any));
   bring_up_devices(network, parts);
   return parts;
 }

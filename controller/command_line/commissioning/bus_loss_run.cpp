@@ -66,10 +66,10 @@ Outcome run(proof::BusLossSession& session, fieldbus::CanNetwork& network, doubl
 Outcome in_simulation(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options) {
   SimulatedArm simulated(arm, options);
   scenes::CompiledScene scene = scenes::compile(session.scene);
-  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings,
-                                                         simulated.network, buses_in_order(session.cell),
-                                                         controller::opener_of(fieldbus::ModbusPeers::on_this_machine),
-                                                         [&](const auto&) { return simulated.far_end.datagram_port(); });
+  controller::CycleParts parts = controller::build_parts(
+      session.cell, session.sensor, scene, session.settings, simulated.network, buses_in_order(session.cell),
+      controller::opener_of(fieldbus::ModbusPeers::on_this_machine),
+      [&](const auto&) { return simulated.far_end.datagram_port(); });
   simulated.power_on();
   controller::bring_up(parts);
   fieldbus::ask_for_words(simulated.network, parts.can_drives);

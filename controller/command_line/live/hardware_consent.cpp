@@ -171,7 +171,9 @@ HardwareSurroundings surroundings_here() {
             return !is_taken(line.serial() ? line.device : line.host) && fieldbus::is_on_this_machine(line);
           },
           [=](const fieldbus::UdpPeer& peer) { return !is_taken(peer.host) && fieldbus::is_on_this_machine(peer); },
-          isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0, std::cin, std::cerr};
+          isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0,
+          std::cin,
+          std::cerr};
 }
 
 }  // namespace

@@ -32,8 +32,8 @@ std::vector<description::ModbusLineDescription> real_lines(const description::Ce
 // Returns the addresses of UDP devices of the cell, other than processes on this machine: the force sensor's, or none.
 std::vector<fieldbus::UdpPeer> real_udp_peers(const PreparedSession& session, const HardwareSurroundings& surroundings);
 
-// Returns normally if no interface, Modbus line or UDP address is real, or if --hardware was given and the checklist was confirmed.
-// Otherwise throws a SetupError that says what is missing.
+// Returns normally if no interface, Modbus line or UDP address is real, or if --hardware was given and the checklist
+// was confirmed. Otherwise throws a SetupError that says what is missing.
 void require_hardware_consent(const PreparedSession& session, const RunOptions& options,
                               const std::vector<std::string>& interfaces, const HardwareSurroundings& surroundings);
 // Requires consent as above, with this process's terminal and kernel. To try the consent out without real hardware, the
