@@ -84,7 +84,7 @@ int sim_command(const RunOptions& options) {
     servers.push_back(std::make_unique<sim::ModbusServer>(line, process.cell().modbus_devices(line.name)));
   }
   std::unique_ptr<sim::UdpServer> sensor_server;
-  if (session.cell.sensor.on_udp()) {
+  if (session.cell.sensor.on_udp()) {  // FarEndProcess has refused a sensor that isn't on UDP
     const int port = session.cell.sensor.port;
     sensor_server = std::make_unique<sim::UdpServer>(session.cell.sensor.host,
                                                      port != 0 ? port : session.sensor.described->datagrams->port);

@@ -311,6 +311,7 @@ std::unique_ptr<fieldbus::ModbusClient> SimulatedCell::modbus_client(const std::
 }
 
 std::unique_ptr<fieldbus::DatagramPort> SimulatedCell::datagram_port() {
+  if (!sensor_datagrams_) return std::make_unique<fieldbus::NoDatagrams>();
   return std::make_unique<InProcessPort>(*sensor_datagrams_);
 }
 

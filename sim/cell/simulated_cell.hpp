@@ -81,7 +81,7 @@ class SimulatedCell final : private Clockwork {
   [[nodiscard]] std::unique_ptr<fieldbus::ModbusClient> modbus_client(const std::string& line);
 
   // The sensor on UDP: either on a wire of a real network, which must outlive the cell, or with a port in this process.
-  // Precondition: the cell's sensor is on UDP.
+  // Precondition of connect_sensor(): the cell's sensor is on UDP. Without one, nothing comes from the port.
   void connect_sensor(DatagramWire& wire) noexcept { sensor_datagrams_->connect(wire); }
   [[nodiscard]] std::unique_ptr<fieldbus::DatagramPort> datagram_port();
 
