@@ -36,11 +36,6 @@ void require_fault_of_sensor(const DeviceFault& fault, const description::Sensor
   if (described && sensor.described->registers && !has_it) {
     refuse("a fault of CAN frames for a sensor on Modbus", "silent, frozen, saturated, or status where it has one");
   }
-  constexpr DeviceFaultKind of_wire_frames[] = {DeviceFaultKind::half_sample, DeviceFaultKind::swapped};
-  if (described && sensor.described->datagrams &&
-      std::find(std::begin(of_wire_frames), std::end(of_wire_frames), fault.kind) != std::end(of_wire_frames)) {
-    refuse("a fault of a sample's CAN frames for a sensor on UDP", "another fault");
-  }
   const bool of_order = fault.kind == DeviceFaultKind::half_sample || fault.kind == DeviceFaultKind::swapped;
   if (of_order && described && sensor.described->frames.size() < 2) {
     refuse("a fault of the frames' order for a sensor with one frame a sample", "another fault");

@@ -132,7 +132,9 @@ class UdpTest(ProgramTest):
         return [(fault["fault"], fault["text"]) for fault in outcome.summary["faults"]]
 
 
-class Sessions(UdpTest):
+class TimingOfSessions(UdpTest):
+    """On the machine's clock: a device that is late by three cycles is a fault. So this runs alone."""
+
     def test_a_session_starts_the_stream_and_stops_it_at_the_end(self):
         device = Device(self.udp)
         outcome = self.session(device)
