@@ -144,8 +144,9 @@ void check_cell(const fs::path& file, const fs::path& scene) {
   tell(controller::surprises(session));
   controller::require_runnable(session, run);
   require_simulable(session);
-  const models::Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
-  std::printf("the tool starts at [%.4g, %.4g, %.4g] m\n", start_W.x(), start_W.y(), start_W.z());
+  // In millimetres, without a negative zero.
+  const models::Vec3 start_W = (1e3 * arm.tool_pose(arm.start_rad()).translation()).array().round() / 1e3 + 0.0;
+  std::printf("the tool starts at [%g, %g, %g] m\n", start_W.x(), start_W.y(), start_W.z());
   std::vector<fieldbus::DriveSlot> slots;
   for (fieldbus::ServoDrive& servo : servos) slots.push_back({&servo, 0});
   tell(fieldbus::losses_of(slots));

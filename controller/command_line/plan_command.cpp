@@ -25,7 +25,7 @@ int plan_command(const controller::RunOptions& options) {
     std::printf("%s", fieldbus::plan_text(plan).c_str());
     all_fit = all_fit && plan.fits;
   }
-  std::printf("%s", controller::modbus_plan_text(session).c_str());
+  std::printf("%s", (controller::modbus_plan_text(session) + controller::udp_plan_text(session)).c_str());
   return all_fit ? 0 : not_carried;
 }
 

@@ -58,7 +58,8 @@ class Replay {
                                    head.bus_of_cell_bus.begin() + static_cast<std::ptrdiff_t>(cell_.buses.size()));
     const auto open_line = [](const description::ModbusLineDescription&, double) { return std::make_unique<NoLine>(); };
     controller::CycleParts parts =
-        controller::build_parts(cell_, sensor_, scene_, head.settings, network_, indices, open_line);
+        controller::build_parts(cell_, sensor_, scene_, head.settings, network_, indices, open_line,
+                                [](const auto&) { return std::make_unique<fieldbus::NoDatagrams>(); });
     cycle_ = std::make_unique<controller::Cycle>(std::move(parts), head.settings, cell_.limits, 2);
     fieldbus::StateArchive state = fieldbus::StateArchive::reader(log_.state());
     cycle_->archive(state);

@@ -13,6 +13,7 @@
 #include "models/base/setup_error.hpp"
 #include "sim/cell/far_end_process.hpp"
 #include "sim/devices/modbus_server.hpp"
+#include "sim/devices/udp_server.hpp"
 
 namespace proxarm::command_line {
 
@@ -82,6 +83,13 @@ int sim_command(const controller::RunOptions& options) {
   std::vector<std::unique_ptr<sim::ModbusServer>> servers;
   for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {
     servers.push_back(std::make_unique<sim::ModbusServer>(line, process.cell().modbus_devices(line.name)));
+  }
+  std::unique_ptr<sim::UdpServer> sensor_server;
+  if (session.cell.sensor.on_udp()) {  // FarEndProcess has refused a sensor that isn't on UDP
+    const int port = session.cell.sensor.port;
+    sensor_server = std::make_unique<sim::UdpServer>(session.cell.sensor.host,
+                                                     port != 0 ? port : session.sensor.described->datagrams->port);
+    process.cell().connect_sensor(*sensor_server);
   }
   if (view) view->watch(process.cell());
   controller::SignalWatch signals([&] { stop.store(true); });

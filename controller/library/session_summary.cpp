@@ -56,8 +56,8 @@ void complete(CycleRecord& record, const controller::PreparedSession& session, s
 namespace {
 
 // Which cable, what was wrong with what came through it, and what the sensor says itself.
-std::string sensor_text(const FaultReport& report, const fieldbus::ForceSensor& sensor, const std::string& bus) {
-  std::string text = "bus " + bus;
+std::string sensor_text(const FaultReport& report, const fieldbus::ForceSensor& sensor, const std::string& where) {
+  std::string text = where;
   if (report.fault == Fault::sensor_status) {
     text += ": " + sensor.describe_status(static_cast<std::uint32_t>(report.value));
   } else if (report.fault == Fault::sensor_lost || report.fault == Fault::sensor_late) {
@@ -74,7 +74,7 @@ bool is_of_sensor(Fault fault) noexcept {
 }
 
 std::string place_of(const FaultReport& report, const CycleParts& parts, const description::Cell& cell) {
-  if (is_of_sensor(report.fault)) return sensor_text(report, *parts.sensor, cell.sensor.bus);
+  if (is_of_sensor(report.fault)) return sensor_text(report, *parts.sensor, cell.sensor.where());
   if (report.fault == Fault::force_at_start) return standing_force_text(report, cell.gravity_W_m_per_s2);
   if (report.where < 0) return "";
   const auto where = static_cast<std::size_t>(report.where);

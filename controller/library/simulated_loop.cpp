@@ -134,7 +134,8 @@ void SimulatedLoop::start() {
     return far_end_.modbus_client(line.name);
   };
   CycleParts parts = build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_,
-                                 controller::buses_in_order(session_.cell), open_line);
+                                 controller::buses_in_order(session_.cell), open_line,
+                                 [this](const auto&) { return far_end_.datagram_port(); });
   put_in(parts);
   far_end_.attach_to(network_);
   far_end_.power_on();

@@ -72,12 +72,20 @@ void require_enabling_input(const PreparedSession& session) {
 }
 
 [[noreturn]] void refuse(const std::vector<std::string>& interfaces,
-                         const std::vector<description::ModbusLineDescription>& lines) {
+                         const std::vector<description::ModbusLineDescription>& lines,
+                         const std::vector<fieldbus::UdpPeer>& udp) {
   const std::string advice = "; for a real arm --hardware, which shows what must be checked before";
   if (!interfaces.empty()) {
     throw SetupError({.bus = interfaces.front(),
                       .message = "this is no virtual CAN interface (vcan, vxcan): a real arm would move",
                       .advice = "use --bus sim or vcan" + advice});
+  }
+  if (lines.empty()) {
+    throw SetupError({.key = "sensor.host",
+                      .message = "this force sensor isn't a process of this machine: a real arm would move",
+                      .found = udp.front().host,
+                      .expected = "a loopback address, 127.x.x.x",
+                      .advice = "use --bus sim or such an address" + advice});
   }
   throw SetupError({.bus = lines.front().name,
                     .message = "this Modbus peer isn't a process of this machine: a real axis would move",
@@ -110,20 +118,31 @@ std::vector<description::ModbusLineDescription> real_lines(const description::Ce
   return real;
 }
 
+std::vector<fieldbus::UdpPeer> real_udp_peers(const PreparedSession& session,
+                                              const HardwareSurroundings& surroundings) {
+  const description::SensorPlacement& sensor = session.cell.sensor;
+  if (!sensor.on_udp() || !session.sensor.described || !session.sensor.described->datagrams) return {};
+  const fieldbus::UdpPeer peer{sensor.host, sensor.port != 0 ? sensor.port : session.sensor.described->datagrams->port};
+  if (surroundings.is_udp_here(peer)) return {};
+  return {peer};
+}
+
 void require_hardware_consent(const PreparedSession& session, const RunOptions& options,
                               const std::vector<std::string>& interfaces, const HardwareSurroundings& surroundings) {
   std::vector<std::string> real = real_interfaces(interfaces, surroundings);
   const std::vector<description::ModbusLineDescription> lines = real_lines(session.cell, surroundings);
+  const std::vector<fieldbus::UdpPeer> udp = real_udp_peers(session, surroundings);
   if (!options.hardware.empty() && options.hardware != "ask" && options.hardware != confirmation) {
     throw SetupError({.key = "--hardware",
                       .found = description::in_quotes(options.hardware),
                       .expected = "--hardware, or for scripts --hardware=checked"});
   }
-  if (real.empty() && lines.empty()) return;
-  if (options.hardware.empty()) refuse(real, lines);
+  if (real.empty() && lines.empty() && udp.empty()) return;
+  if (options.hardware.empty()) refuse(real, lines, udp);
   require_enabling_input(session);
   if (!options.without_proof) require_proof(session);
   for (const description::ModbusLineDescription& line : lines) real.push_back(fieldbus::peer_text(line));
+  for (const fieldbus::UdpPeer& peer : udp) real.push_back(fieldbus::peer_text(peer));
   print_checklist(session, real, !lines.empty(), surroundings.out);
   if (options.hardware == confirmation) return;
   if (!surroundings.on_terminal) {
@@ -151,7 +170,10 @@ HardwareSurroundings surroundings_here() {
           [=](const description::ModbusLineDescription& line) {
             return !is_taken(line.serial() ? line.device : line.host) && fieldbus::is_on_this_machine(line);
           },
-          isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0, std::cin, std::cerr};
+          [=](const fieldbus::UdpPeer& peer) { return !is_taken(peer.host) && fieldbus::is_on_this_machine(peer); },
+          isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0,
+          std::cin,
+          std::cerr};
 }
 
 }  // namespace
@@ -163,7 +185,8 @@ void require_hardware_consent(const PreparedSession& session, const RunOptions& 
 
 bool is_real(const PreparedSession& session, const std::vector<std::string>& interfaces) {
   const HardwareSurroundings surroundings = surroundings_here();
-  return !real_interfaces(interfaces, surroundings).empty() || !real_lines(session.cell, surroundings).empty();
+  return !real_interfaces(interfaces, surroundings).empty() || !real_lines(session.cell, surroundings).empty() ||
+         !real_udp_peers(session, surroundings).empty();
 }
 
 }  // namespace proxarm::controller

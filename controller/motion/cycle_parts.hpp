@@ -68,7 +68,7 @@ struct CycleParts {
   std::vector<fieldbus::DriveSlot> can_drives;  // the drives on CAN; all drives if drives take torques
   std::vector<DriveBus> drive_buses;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
-  std::size_t sensor_bus;  // index of the sensor's bus; DriveOnBus::no_bus: the sensor is on a Modbus line
+  std::size_t sensor_bus;  // index of the sensor's bus; DriveOnBus::no_bus: the sensor is on a Modbus line or on UDP
   // Declared after drives and sensor, so that the lines' threads end before drives and sensor are destroyed.
   std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines;
   std::unique_ptr<models::Arm> arm;  // the arm is on the heap, because other objects keep references to it

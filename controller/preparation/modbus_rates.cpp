@@ -6,6 +6,7 @@
 #include "fieldbus/modbus/modbus_client.hpp"
 #include "fieldbus/modbus/modbus_drive.hpp"
 #include "fieldbus/modbus/modbus_line.hpp"
+#include "fieldbus/udp/udp_port.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/description/modbus_drive.hpp"
 
@@ -109,6 +110,16 @@ std::string modbus_plan_text(const PreparedSession& session) {
     text += short_text(rate_Hz) + " samples/s\n";
   }
   return text;
+}
+
+std::string udp_plan_text(const PreparedSession& session) {
+  const description::SensorPlacement& sensor = session.cell.sensor;
+  if (!sensor.on_udp()) return {};
+  const description::SensorProtocol& protocol = *session.sensor.described;
+  return "sensor: UDP, " +
+         fieldbus::peer_text({sensor.host, sensor.port != 0 ? sensor.port : protocol.datagrams->port}) + "\n  " +
+         description::number_text(protocol.rate_Hz) + " datagrams/s of " + std::to_string(protocol.sample_bytes()) +
+         " bytes; a reading is up to " + in_ms(1.0 / protocol.rate_Hz) + " old when a cycle begins\n";
 }
 
 void report_modbus_rates(const PreparedSession& session, const CycleParts& parts) {

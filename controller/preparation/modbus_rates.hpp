@@ -21,4 +21,7 @@ double slowest_report_Hz(const description::Cell& cell);
 // Prints the warning of report_modbus_rates() on standard error, for the expected rates. Asks no device.
 std::string modbus_plan_text(const PreparedSession& session);
 
+// Returns a text with the address and the rate of a sensor on UDP; empty for any other sensor.
+std::string udp_plan_text(const PreparedSession& session);
+
 }  // namespace proxarm::controller

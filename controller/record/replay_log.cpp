@@ -219,10 +219,10 @@ ReplayReader::ReplayReader(const fs::path& file) : name_(file) {
   archive(entry, head_);
   if (!entry.whole() || entry.bytes() != entry_.size()) refuse("the head of another version");
   const auto ended = [](const auto& text) { return is_ended(text); };
-  const auto known = [this](std::uint8_t bus) { return bus < head_.buses; };
-  if (head_.axes > max_axes || head_.buses == 0 || head_.buses > max_buses || !is_ended(head_.cell) ||
-      !is_ended(head_.scene) || !is_ended(head_.tool) ||
-      !std::all_of(head_.bus_names.begin(), head_.bus_names.end(), ended) ||
+  // A cell without CAN buses has none; the unused entries are 0.
+  const auto known = [this](std::uint8_t bus) { return bus < std::max<std::uint32_t>(head_.buses, 1); };
+  if (head_.axes > max_axes || head_.buses > max_buses || !is_ended(head_.cell) || !is_ended(head_.scene) ||
+      !is_ended(head_.tool) || !std::all_of(head_.bus_names.begin(), head_.bus_names.end(), ended) ||
       !std::all_of(head_.bus_of_cell_bus.begin(), head_.bus_of_cell_bus.end(), known)) {
     refuse("a head that is damaged");
   }

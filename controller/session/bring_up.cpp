@@ -11,6 +11,7 @@
 #include "fieldbus/canopen/canopen_pdo.hpp"
 #include "fieldbus/sensors/ati_net_can_oem.hpp"
 #include "fieldbus/sensors/described_sensor.hpp"
+#include "fieldbus/udp/datagram_sensor.hpp"
 #include "models/arm/tool_inertia.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/files/eds_bitrates.hpp"
@@ -110,7 +111,37 @@ struct Sensor {
   fieldbus::ModbusSensor* on_line = nullptr;  // points to `owned`; null for a sensor on a CAN bus
 };
 
-Sensor build_sensor(const description::Cell& cell, const description::SensorDescription& sensor) {
+// For a sensor that is only asked about itself.
+std::unique_ptr<fieldbus::DatagramPort> no_port(const fieldbus::UdpPeer&) {
+  return std::make_unique<fieldbus::NoDatagrams>();
+}
+
+std::unique_ptr<fieldbus::ForceSensor> udp_sensor(const description::Cell& cell,
+                                                  const description::SensorDescription& sensor,
+                                                  const DatagramOpener& open_port) {
+  if (cell.sensor.base_id != 0) {
+    throw SetupError({.file = cell.file.string(),
+                      .key = "sensor.base_id",
+                      .found = std::to_string(cell.sensor.base_id),
+                      .expected = "none: a sensor on UDP has an address instead, sensor.host"});
+  }
+  const fieldbus::UdpPeer peer{cell.sensor.host,
+                               cell.sensor.port != 0 ? cell.sensor.port : sensor.described->datagrams->port};
+  return std::make_unique<fieldbus::DatagramSensor>(
+      sensor, open_port(peer), fieldbus::DatagramSensorSettings{.peer = fieldbus::peer_text(peer)});
+}
+
+Sensor build_sensor(const description::Cell& cell, const description::SensorDescription& sensor,
+                    const DatagramOpener& open_port) {
+  const bool has_datagrams = sensor.described && sensor.described->datagrams;
+  if (has_datagrams != cell.sensor.on_udp()) {
+    throw SetupError({.file = cell.file.string(),
+                      .key = has_datagrams ? "sensor.bus" : "sensor.host",
+                      .found = description::in_quotes(has_datagrams ? cell.sensor.bus : cell.sensor.host),
+                      .expected = has_datagrams ? "sensor.host in its place: " + sensor.name + " sends UDP datagrams"
+                                                : "sensor.bus in its place: " + sensor.name + " is on a bus"});
+  }
+  if (has_datagrams) return {udp_sensor(cell, sensor, open_port)};
   const bool on_line = index_of(cell, cell.sensor.bus) == cell.buses.size();
   if (on_line != (sensor.described && sensor.described->registers)) {
     throw SetupError({.file = cell.file.string(),
@@ -304,7 +335,7 @@ void require_felt(const description::Cell& cell, const SessionSettings& settings
 
 std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
                                                    const description::SensorDescription& sensor) {
-  return build_sensor(cell, sensor).owned;
+  return build_sensor(cell, sensor, no_port).owned;
 }
 
 // Drives in mode cst take torques, drives in all other modes take positions.
@@ -335,12 +366,16 @@ ModbusOpener opener_of(fieldbus::ModbusPeers peers) {
   };
 }
 
+DatagramOpener opener_of(fieldbus::UdpPeers peers) {
+  return [peers](const fieldbus::UdpPeer& peer) { return fieldbus::open_udp(peer, peers); };
+}
+
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
-                       const BusIndices& bus_indices, const ModbusOpener& open_line) {
+                       const BusIndices& bus_indices, const ModbusOpener& open_line, const DatagramOpener& open_port) {
   require_scheme(cell, settings);
   Drives drives = make_drives(cell, settings, bus_indices);
-  Sensor force_sensor = build_sensor(cell, sensor);
+  Sensor force_sensor = build_sensor(cell, sensor, open_port);
   std::vector<std::unique_ptr<fieldbus::ModbusLine>> lines =
       modbus_lines(cell, drives.modbus, force_sensor.on_line, open_line);
   auto arm = std::make_unique<models::Arm>(cell);

@@ -11,6 +11,7 @@
 
 #include "controller/cycle/cycle.hpp"
 #include "fieldbus/cia402/cia402_bring_up.hpp"
+#include "fieldbus/udp/udp_port.hpp"
 #include "models/description/cell.hpp"
 #include "models/description/sensor.hpp"
 #include "scenes/compiler/compile.hpp"
@@ -25,6 +26,11 @@ using ModbusOpener = std::function<std::unique_ptr<fieldbus::ModbusClient>(const
                                                                            double response_timeout_s)>;
 // Returns an opener that calls fieldbus::open_modbus() with these peers.
 ModbusOpener opener_of(fieldbus::ModbusPeers peers);
+
+// Opens the port to a force sensor on UDP.
+using DatagramOpener = std::function<std::unique_ptr<fieldbus::DatagramPort>(const fieldbus::UdpPeer&)>;
+// Returns an opener that calls fieldbus::open_udp() with these peers.
+DatagramOpener opener_of(fieldbus::UdpPeers peers);
 
 // Returns the sensor, not started. Throws SetupError if the sensor can't have the cell's base_id, or if its bus is of
 // the wrong kind.
@@ -49,7 +55,8 @@ double felt_inertia_kg_m2(const description::Cell& cell, const SessionSettings& 
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
                        const BusIndices& bus_indices,
-                       const ModbusOpener& open_line = opener_of(fieldbus::ModbusPeers::on_this_machine));
+                       const ModbusOpener& open_line = opener_of(fieldbus::ModbusPeers::on_this_machine),
+                       const DatagramOpener& open_port = opener_of(fieldbus::UdpPeers::on_this_machine));
 
 // Returns the identifiers that this bus of the network must let through, for the kernel's filters.
 std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus);

@@ -45,8 +45,9 @@ struct SocketCanOptions {
 
 class SocketCanNetwork final : public CanNetwork {
  public:
-  // Opens all interfaces. Throws SetupError if the kernel has no CAN, or if an interface doesn't exist, is no CAN
-  // interface or is down. The message says what to do. `system` must outlive the network.
+  // Opens all interfaces; without any, the network has no bus but keeps the time. Throws SetupError if the kernel has
+  // no CAN, or if an interface doesn't exist, is no CAN interface or is down. The message says what to do. `system`
+  // must outlive the network.
   explicit SocketCanNetwork(const std::vector<std::string>& interfaces, const SocketCanOptions& options = {},
                             CanSystem& system = CanSystem::real());
   ~SocketCanNetwork() override;

@@ -82,15 +82,29 @@ BusDescription read_bus(const YamlNode& node) {
   return bus;
 }
 
+// Reads a numeric IPv4 address.
+std::string read_address(const YamlNode& node, std::string_view key) {
+  return text_like(
+      node, key,
+      {R"(((25[0-5]|2[0-4][0-9]|1[0-9][0-9]|[1-9]?[0-9])(\.(?!$)|$)){4})", "a numeric address, such as 192.168.0.10"});
+}
+
+// Reads the address of one device. Addresses of no device (0.x.x.x, and from 224.x.x.x on multicast and broadcast) are
+// refused.
+std::string read_host(const YamlNode& node) {
+  std::string host = read_address(node, "host");
+  const int first = std::stoi(host);
+  if (first == 0 || first >= 224) throw node.error_at("host", "the address of one device", in_quotes(host));
+  return host;
+}
+
 ModbusLineDescription read_modbus_line(const YamlNode& node) {
   ModbusLineDescription line;
   line.name = read_name(node, "name");
   const std::string where = exactly_one(
       node, {"host", "device"}, "either host (and port) of a TCP connection, or device (and baud) of a serial line");
   if (where == "host") {
-    line.host = text_like(node, "host",
-                          {R"(((25[0-5]|2[0-4][0-9]|1[0-9][0-9]|[1-9]?[0-9])(\.(?!$)|$)){4})",
-                           "a numeric address, such as 192.168.0.10"});
+    line.host = read_address(node, "host");
     line.port = static_cast<int>(node.integer_or("port", line.port, 1, 65535));
     return line;
   }
@@ -126,7 +140,12 @@ SensorChoices read_choices(const YamlNode& node) {
 SensorPlacement read_sensor(const YamlNode& node) {
   SensorPlacement s;
   s.description = node.existing_file("description").string();
-  s.bus = node.string("bus");
+  if (exactly_one(node, {"bus", "host"}, "either bus, or host (and port) of a sensor on UDP") == "host") {
+    s.host = read_host(node);
+    s.port = static_cast<int>(node.integer_or("port", 0, 1, 65535));
+  } else {
+    s.bus = node.string("bus");
+  }
   s.base_id = static_cast<std::uint32_t>(node.integer_or("base_id", 0, 0, 0x1fffffff));
   s.choices = read_choices(node);
   s.link = node.string("link");
@@ -327,7 +346,7 @@ Cell read_cell(const YamlNode& root) {
   cell.sensor = read_sensor(root.map("sensor"));
   const bool on_line = std::any_of(cell.modbus_lines.begin(), cell.modbus_lines.end(),
                                    [&](const ModbusLineDescription& line) { return line.name == cell.sensor.bus; });
-  if (!on_line) check_bus(root.map("sensor"), cell.sensor.bus, cell.buses);
+  if (!on_line && !cell.sensor.on_udp()) check_bus(root.map("sensor"), cell.sensor.bus, cell.buses);
   if (const auto limits = root.find_map("limits")) cell.limits = read_limits(*limits);
   const bool torques = std::any_of(cell.drives.begin(), cell.drives.end(),
                                    [](const DriveDescription& drive) { return drive.mode == "cst"; });

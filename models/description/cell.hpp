@@ -235,7 +235,9 @@ struct ToolDescription {
 struct SensorPlacement {
   // Absolute path of the sensor's file. In the cell's file, the path is relative to the cell file's folder.
   std::string description;
-  std::string bus;
+  std::string bus;            // name of the CAN bus or the Modbus line; empty for a sensor on UDP
+  std::string host;           // UDP: the sensor's numeric IPv4 address; empty for a sensor on a bus
+  int port = 0;               // UDP: the sensor's port; 0: the port in its file
   std::uint32_t base_id = 0;  // the sensor's file defines how it is used; some sensors have no base id
   SensorChoices choices;      // from the keys settings, force_range_N and torque_range_Nm
   std::string link;           // the link in the URDF that carries the sensor (the flange)
@@ -248,6 +250,10 @@ struct SensorPlacement {
   double delay_s = 0.0;         // additional age of the sensor's readings
   // Largest difference between the sensor's zero at the tare and its known zero; 0: zero_drift_N(sensor).
   double zero_drift_N = 0.0;
+
+  [[nodiscard]] bool on_udp() const noexcept { return !host.empty(); }
+  // Returns the bus or the address for messages, such as "bus sensor" or "UDP 192.168.1.1".
+  [[nodiscard]] std::string where() const { return on_udp() ? "UDP " + host : "bus " + bus; }
 
   bool operator==(const SensorPlacement&) const = default;
 };

@@ -122,13 +122,16 @@ struct Reader {
 
   // Reads the place of a number. Throws SetupError unless the number is within the first `within` bytes.
   [[nodiscard]] NumberField read_number(const YamlNode& node, std::size_t within) const {
+    if (!node.has("signal")) return read_place(node, within);
+    std::size_t at = 0;
+    NumberField number = find_signal(node, at)->number;
+    number.byte += at;
+    return number;
+  }
+
+  // Does what read_number() does, for a number that has no signal in a DBC file.
+  [[nodiscard]] NumberField read_place(const YamlNode& node, std::size_t within) const {
     NumberField number;
-    if (node.has("signal")) {
-      std::size_t at = 0;
-      number = find_signal(node, at)->number;
-      number.byte += at;
-      return number;
-    }
     if (protocol.registers) {
       const std::int64_t first = protocol.registers->at, last = first + protocol.registers->count - 1;
       within = 2 * static_cast<std::size_t>(protocol.registers->count);  // the frame may be longer than the registers
@@ -177,16 +180,18 @@ struct Reader {
     return static_cast<std::uint32_t>(number_of(id, 0, protocol.extended ? 0x1FFFFFFF : 0x7FF));
   }
 
-  [[nodiscard]] std::vector<std::uint8_t> read_bytes(const YamlNode& node, std::string_view key,
-                                                     std::size_t most) const {
+  [[nodiscard]] std::vector<std::uint8_t> read_bytes(const YamlNode& node, std::string_view key, std::size_t most,
+                                                     std::size_t least = 0) const {
     std::vector<std::uint8_t> bytes;
-    for (const YamlNode& item : node.list(key, 0, most)) {
+    for (const YamlNode& item : node.list(key, least, most)) {
       bytes.push_back(static_cast<std::uint8_t>(number_of(item, 0, 255)));
     }
     return bytes;
   }
 
   void read_format() {
+    big_endian = read_order(root, true);
+    if (root.has("datagrams")) return;  // these keys are those of CAN frames
     if (const auto format = root.find_map("format")) {
       protocol.extended = format->boolean_or("extended", false);
       protocol.fd = format->boolean_or("fd", false);
@@ -199,7 +204,6 @@ struct Reader {
       protocol.base_id_max = static_cast<std::uint32_t>(base->integer("max", protocol.base_id_min, 0x1FFFFFFF));
       protocol.base_id_step = static_cast<std::uint32_t>(base->integer_or("step", 1, 1, 0x1000000));
     }
-    big_endian = read_order(root, true);
     if (root.has("dbc")) dbc = load_dbc(protocol.dbc = root.existing_file("dbc"));
   }
 
@@ -270,8 +274,19 @@ struct Reader {
     messages.push_back(nullptr);
   }
 
+  // Reads the datagrams. Each counts as one frame; its identifier is unused.
+  void read_datagrams() {
+    const YamlNode node = root.map("datagrams");
+    protocol.fd = true;  // a frame with room for 64 bytes
+    const auto bytes = node.integer("bytes", 1, static_cast<std::int64_t>(protocol.frame_capacity()));
+    protocol.datagrams = SensorDatagrams{.port = static_cast<int>(node.integer("port", 1, 65535))};
+    protocol.frames.push_back({.id = 1, .bytes = static_cast<std::uint8_t>(bytes), .starts_with = {}});
+    messages.push_back(nullptr);
+  }
+
   void read_frames() {
     if (root.has("registers")) return read_registers();
+    if (root.has("datagrams")) return read_datagrams();
     for (const YamlNode& node : root.list("frames", 1, max_sample_frames)) protocol.frames.push_back(read_frame(node));
     if (protocol.sample_bytes() > max_sample_bytes) throw root.error_at("frames", "up to 256 bytes in all");
     // The first frame must differ from all other frames by its identifier, its length or its first bytes.
@@ -366,6 +381,7 @@ struct Reader {
   }
 
   void read_conversation() {
+    if (protocol.datagrams) return read_stream();
     protocol.poll = read_command(root, "poll");
     if (protocol.poll && protocol.poll->data.size() + (protocol.poll->sum16 ? 2U : 0U) > protocol.frame_capacity()) {
       throw root.error_at("poll", "a poll of one frame");
@@ -381,6 +397,25 @@ struct Reader {
     protocol.rate = read_command(*commands, "rate");
     protocol.start = read_command(*commands, "start");
     check_rate(*commands);
+  }
+
+  // Reads the stream of a sensor on UDP, which must be started and can be stopped.
+  void read_stream() {
+    constexpr std::int64_t fastest_Hz = 20'000;
+    const YamlNode rate = root.at("rate_Hz");
+    protocol.rate_Hz = setting_named(rate) == settings.end() ? root.number("rate_Hz", above(0.0, fastest_Hz))
+                                                             : static_cast<double>(number_of(rate, 1, fastest_Hz));
+    protocol.together_s = 0.5 / protocol.rate_Hz;
+    const YamlNode commands = root.map("commands");
+    protocol.stop = read_datagram(commands.map("stop"));
+    protocol.start = read_datagram(commands.map("start"));
+  }
+
+  [[nodiscard]] SensorCommand read_datagram(const YamlNode& node) const {
+    SensorCommand command;
+    command.id = 1;
+    command.data = read_bytes(node, "data", 64, 1);
+    return command;
   }
 
   void check_rate(const YamlNode& commands) const {
@@ -432,6 +467,9 @@ struct Reader {
       claim(node, by_name ? components[i] : "signal " + std::to_string(i + 1), protocol.signals[i].number, taken);
     }
     if (protocol.counter) claim(root.map("counter"), "counter", *protocol.counter, taken);
+    if (protocol.reading_counter) {
+      claim(root.map("reading_counter"), "reading_counter", *protocol.reading_counter, taken);
+    }
     if (protocol.status) claim(root.map("status"), "status", protocol.status->number, taken);
     if (protocol.checksum) claim(root.map("checksum"), "checksum", protocol.checksum->number, taken);
   }
@@ -493,6 +531,9 @@ SensorProtocol read_sensor_protocol(const YamlNode& root, const SensorChoices& c
     if (protocol.counter->kind != NumberKind::unsigned_integer || protocol.counter->bits < 2) {
       throw node->error("a counter that is unsigned and has 2 bits or more");
     }
+  }
+  if (const auto node = protocol.datagrams ? root.find_map("reading_counter") : std::nullopt) {
+    protocol.reading_counter = reader.read_place(*node, protocol.sample_bytes());
   }
   reader.read_status();
   reader.read_checksum();

@@ -32,6 +32,13 @@
 // sample:
 //   registers: {at: 180, count: 6, response_timeout_s: 0.05}   # holding registers, numbered from 0; read at rate_Hz
 //   signals: {fx: {register: 180, bits: 16, type: signed, scale: 0.01}, ...}   # bits: 16 (the default) or 32
+// A sensor on UDP has datagrams instead of frames and format; each datagram is one sample. Its commands have data
+// alone:
+//   datagrams: {bytes: 36, port: 49152}          # the sensor's port, if the cell doesn't state another
+//   reading_counter: {byte: 4, bits: 32}         # the number of the reading; the simulated sensor counts it, nothing
+//                                                # judges it
+//   rate_Hz: rate                                # a number or, for datagrams, also the name of a setting
+//   commands: {stop: {data: [...]}, start: {data: [...]}}
 // The bits of a number are placed by two keys: `byte` is the number's first byte in the sample, and `shift` is how many
 // bits of the number's lowest byte are below the number.
 #pragma once
@@ -115,16 +122,23 @@ struct SensorRegisters {
   double response_timeout_s = 0.05;
 };
 
+struct SensorDatagrams {
+  int port = 0;  // the sensor's UDP port
+};
+
 struct SensorProtocol {
   bool extended = false, fd = false, bit_rate_switch = false;
   // For a sensor on Modbus. `frames` then has one frame with the bytes of the registers.
   std::optional<SensorRegisters> registers;
+  // For a sensor on UDP. `frames` then has one frame with the bytes of a datagram.
+  std::optional<SensorDatagrams> datagrams;
   bool has_base_id = false, has_settings = false;
   std::uint32_t base_id_min = 0, base_id_max = 0, base_id_step = 1;
   std::vector<SampleFrame> frames;
   std::vector<SensorSignal> signals;                  // fx fy fz tx ty tz, or one signal for each column of the matrix
   std::vector<std::array<double, 6>> matrix_columns;  // empty: there is no matrix
   std::optional<NumberField> counter;
+  std::optional<NumberField> reading_counter;  // only for datagrams
   std::optional<SensorStatus> status;
   std::optional<SensorChecksum> checksum;
   std::optional<SensorCommand> poll;
@@ -135,6 +149,7 @@ struct SensorProtocol {
 
   [[nodiscard]] std::size_t sample_bytes() const noexcept;
   [[nodiscard]] bool streams() const noexcept { return !poll; }
+  [[nodiscard]] bool on_can() const noexcept { return !registers && !datagrams; }
   // Returns the identifier on the wire.
   [[nodiscard]] std::uint32_t wire_id(std::uint32_t id, std::uint32_t base_id) const noexcept {
     return id + base_id * base_id_step;

@@ -26,7 +26,7 @@ bool is_used_by(std::uint8_t node, std::uint32_t id) noexcept {
 
 std::vector<std::uint32_t> sensor_ids(const description::Cell& cell, const description::SensorDescription& sensor) {
   std::vector<std::uint32_t> ids;
-  if (sensor.described && sensor.described->registers) return ids;  // the sensor is on Modbus
+  if (sensor.described && !sensor.described->on_can()) return ids;
   if (sensor.described && !sensor.described->extended) return sensor.described->wire_ids(cell.sensor.base_id);
   if (sensor.described) return ids;  // 29-bit identifiers can't collide with a drive's
   for (std::uint32_t operation = 0; operation < 16; ++operation) ids.push_back(cell.sensor.base_id << 4 | operation);
@@ -174,7 +174,7 @@ void set_acceptance_filters(fieldbus::SocketCanNetwork& network, const descripti
   }
   if (!sensor.described) {
     filters_of(cell.sensor.bus).push_back({.id = cell.sensor.base_id << 4, .mask = 0x7F0});
-  } else if (!sensor.described->registers) {
+  } else if (sensor.described->on_can()) {
     for (const std::uint32_t id : sensor.described->wire_ids(cell.sensor.base_id)) {
       filters_of(cell.sensor.bus).push_back({.id = id, .extended = sensor.described->extended});
     }

@@ -310,6 +310,11 @@ std::unique_ptr<fieldbus::ModbusClient> SimulatedCell::modbus_client(const std::
   return std::make_unique<WirelessModbus>(modbus_devices(line));
 }
 
+std::unique_ptr<fieldbus::DatagramPort> SimulatedCell::datagram_port() {
+  if (!sensor_datagrams_) return std::make_unique<fieldbus::NoDatagrams>();
+  return std::make_unique<InProcessPort>(*sensor_datagrams_);
+}
+
 void SimulatedCell::add_sensor(const description::SensorDescription& sensor) {
   if (sensor.described && sensor.described->registers) {
     wrench_ = std::make_unique<PlantWrench>(plant_);
@@ -317,6 +322,13 @@ void SimulatedCell::add_sensor(const description::SensorDescription& sensor) {
                                                              static_cast<std::uint8_t>(cell_.sensor.base_id));
     described_sensor_ =
         std::make_unique<DescribedDevice>(sensor, DescribedDeviceConfig{}, *wrench_, *sensor_registers_);
+    return;
+  }
+  if (sensor.described && sensor.described->datagrams) {
+    wrench_ = std::make_unique<PlantWrench>(plant_);
+    sensor_datagrams_ = std::make_unique<DatagramSensorDevice>();
+    described_sensor_ =
+        std::make_unique<DescribedDevice>(sensor, DescribedDeviceConfig{}, *wrench_, *sensor_datagrams_);
     return;
   }
   Clockwork& clockwork = *this;
@@ -360,7 +372,7 @@ std::size_t SimulatedCell::axis_of(const std::string& joint) const noexcept {
 
 void SimulatedCell::attach_to(fieldbus::SimulatedCanNetwork& network) {
   using fieldbus::NodeFormat;
-  const bool fd_sensor = described_sensor_ && !sensor_registers_ && described_sensor_->fd();
+  const bool fd_sensor = described_sensor_ && !sensor_registers_ && !sensor_datagrams_ && described_sensor_->fd();
   for (const auto& node : nodes_) {
     const auto drive = std::find_if(cell_.drives.begin(), cell_.drives.end(),
                                     [&](const description::DriveDescription& d) { return d.joint == node->name(); });
@@ -378,7 +390,7 @@ void SimulatedCell::power_on() {
   for (const auto& node : nodes_) node->set_power(true, now_ns);
   const bool any_sync = std::any_of(drives_.begin(), drives_.end(), [](const auto& drive) { return drive != nullptr; });
   if (enabling_ && !any_sync) enabling_->begin_without_sync(now_ns);
-  if (sensor_registers_) described_sensor_->power_on(now_ns);
+  if (sensor_registers_ || sensor_datagrams_) described_sensor_->power_on(now_ns);
   schedule_faults();
   if (described_sensor_ && described_sensor_->period_ns() > 0) {
     events_.schedule(now_ns + described_sensor_->period_ns(), [this](std::int64_t time_ns) { convert(time_ns); });
@@ -403,6 +415,7 @@ void SimulatedCell::tick(std::int64_t time_ns) noexcept {
   events_.schedule(time_ns + tick_ns_, [this](std::int64_t next_ns) { tick(next_ns); });
   advance_to(time_ns);
   for (const auto& node : nodes_) node->on_time(time_ns);
+  if (sensor_datagrams_) sensor_datagrams_->obey(*described_sensor_, time_ns);
   press(time_ns);
   if (helper_) helper_->on_time(time_ns);
   for (const auto& drive : modbus_drives_) {

@@ -20,6 +20,7 @@
 #include "models/description/sensor.hpp"
 #include "sim/bus/device_node.hpp"
 #include "sim/devices/ati_device.hpp"
+#include "sim/devices/datagram_sensor_device.hpp"
 #include "sim/devices/described_device.hpp"
 #include "sim/devices/device_fault.hpp"
 #include "sim/devices/drive_device.hpp"
@@ -78,6 +79,11 @@ class SimulatedCell final : private Clockwork {
   // are answered at once. The cell must outlive the results.
   [[nodiscard]] std::vector<ModbusUnit*> modbus_devices(const std::string& line);
   [[nodiscard]] std::unique_ptr<fieldbus::ModbusClient> modbus_client(const std::string& line);
+
+  // The sensor on UDP: either on a wire of a real network, which must outlive the cell, or with a port in this process.
+  // Precondition of connect_sensor(): the cell's sensor is on UDP. Without one, nothing comes from the port.
+  void connect_sensor(DatagramWire& wire) noexcept { sensor_datagrams_->connect(wire); }
+  [[nodiscard]] std::unique_ptr<fieldbus::DatagramPort> datagram_port();
 
   // Connects each node to the network's bus with the same name.
   void attach_to(fieldbus::SimulatedCanNetwork& network);
@@ -143,6 +149,8 @@ class SimulatedCell final : private Clockwork {
   std::unique_ptr<AtiDevice> sensor_;  // nullptr: described_sensor_ is used
   // Registers of described_sensor_ if it is on Modbus, else nullptr.
   std::unique_ptr<ModbusSensorDevice> sensor_registers_;
+  // Wire of described_sensor_ if it is on UDP, else nullptr.
+  std::unique_ptr<DatagramSensorDevice> sensor_datagrams_;
   std::unique_ptr<DescribedDevice> described_sensor_;
   std::unique_ptr<EnablingSwitch> enabling_;
   std::size_t enabling_axis_ = 0;  // the axis to whose drive the switch is wired

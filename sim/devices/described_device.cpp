@@ -94,6 +94,7 @@ void DescribedDevice::on_frame(const CanFrame& frame, std::int64_t time_ns) noex
   // The commands are checked in the order in which a master sends them. If stop and rate differ only in the value, the
   // value 0 means stop.
   if (is(protocol_.start, frame)) {
+    if (protocol_.datagrams) count_ = 1;  // a stream of datagrams is counted from its start
     streaming_ = true;
   } else if (is(protocol_.stop, frame)) {
     streaming_ = false;
@@ -173,7 +174,9 @@ void DescribedDevice::fill(std::int64_t time_ns) noexcept {
     at += frame.bytes;
   }
   if (protocol_.counter) put(*protocol_.counter, count_);
-  if (!faults_.frozen) ++count_;
+  if (protocol_.reading_counter) put(*protocol_.reading_counter, count_);
+  // A sensor on UDP counts its datagrams, even if their readings are frozen.
+  if (!faults_.frozen || protocol_.datagrams) ++count_;
   if (protocol_.status) put(protocol_.status->number, faults_.status_bits);
   fill_signals(time_ns);
   fill_checksum();
@@ -189,7 +192,7 @@ void DescribedDevice::send_part(std::size_t part, std::int64_t time_ns) noexcept
   frame.fd = protocol_.fd;
   frame.bit_rate_switch = protocol_.bit_rate_switch;
   frame.length = protocol_.frames[part].bytes;
-  if (faults_.short_frames && frame.length <= 8) --frame.length;
+  if (faults_.short_frames && (frame.length <= 8 || protocol_.datagrams)) --frame.length;
   std::copy_n(sample_.begin() + static_cast<std::ptrdiff_t>(at), frame.length, frame.data.begin());
   for (int copies = faults_.duplicated ? 2 : 1; copies > 0; --copies) port_.send(frame, time_ns + faults_.delay_ns);
 }

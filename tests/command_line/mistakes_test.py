@@ -223,7 +223,8 @@ class Mistakes(unittest.TestCase):
         self.assertGreater(len(cells), 6)
         for cell in cells:
             status, said = answer("check", cell)
-            self.assertEqual((0, f"{cell}: fine, a cell\n"), (status, said))
+            self.assertEqual(status, 0, said)
+            self.assertRegex(said, rf"^the tool starts at \[[^]]*\] m\n{re.escape(cell)}: fine, a cell\n$")
         for folder in ("scenes", "sim/hands"):
             for name in sorted(os.listdir(os.path.join(ROOT, folder))):
                 if not name.endswith(".yaml"):

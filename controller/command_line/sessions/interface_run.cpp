@@ -170,9 +170,10 @@ int run_on_interfaces(const controller::PreparedSession& session, const controll
 
   scenes::CompiledScene scene = scenes::compile(session.scene);
   controller::FrameTap tap(network, frame_capacity);
-  // Any Modbus peer is allowed, because require_hardware_consent() was called above.
+  // Any Modbus or UDP peer is allowed, because require_hardware_consent() was called above.
   controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, tap,
-                                                         indices, controller::opener_of(fieldbus::ModbusPeers::any));
+                                                         indices, controller::opener_of(fieldbus::ModbusPeers::any),
+                                                         controller::opener_of(fieldbus::UdpPeers::any));
   SessionOutput output(session, options, false);
   std::unique_ptr<controller::ReplayRecorder> replay;
   std::unique_ptr<controller::RecordedMessages> messages;

@@ -41,7 +41,8 @@ controller::CycleParts SimulatedArm::brought_up(const controller::PreparedSessio
     return far_end.modbus_client(line.name);
   };
   controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         controller::buses_in_order(session.cell), open_line);
+                                                         controller::buses_in_order(session.cell), open_line,
+                                                         [&](const auto&) { return far_end.datagram_port(); });
   power_on();
   controller::bring_up(parts, [&](fieldbus::ModbusLine& line) { controller::pump(network, line, network.now_ns()); });
   return parts;
@@ -55,9 +56,9 @@ ArmOnInterfaces::ArmOnInterfaces(const controller::PreparedSession& session, con
 
 controller::CycleParts ArmOnInterfaces::brought_up(const controller::PreparedSession& session,
                                                    scenes::CompiledScene& scene) {
-  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         indices_in(network, interfaces.size()),
-                                                         controller::opener_of(fieldbus::ModbusPeers::any));
+  controller::CycleParts parts = controller::build_parts(
+      session.cell, session.sensor, scene, session.settings, network, indices_in(network, interfaces.size()),
+      controller::opener_of(fieldbus::ModbusPeers::any), controller::opener_of(fieldbus::UdpPeers::any));
   bring_up_devices(network, parts);
   return parts;
 }

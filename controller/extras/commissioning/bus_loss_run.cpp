@@ -67,8 +67,10 @@ Outcome in_simulation(const controller::PreparedSession& session, const controll
                       const controller::RunOptions& options) {
   SimulatedArm simulated(arm, options);
   scenes::CompiledScene scene = scenes::compile(session.scene);
-  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings,
-                                                         simulated.network, controller::buses_in_order(session.cell));
+  controller::CycleParts parts = controller::build_parts(
+      session.cell, session.sensor, scene, session.settings, simulated.network,
+      controller::buses_in_order(session.cell), controller::opener_of(fieldbus::ModbusPeers::on_this_machine),
+      [&](const auto&) { return simulated.far_end.datagram_port(); });
   simulated.power_on();
   controller::bring_up(parts);
   fieldbus::ask_for_words(simulated.network, parts.can_drives);
@@ -80,7 +82,9 @@ Outcome on_interfaces(const controller::PreparedSession& session, const controll
   ArmOnInterfaces arm(session, options);
   scenes::CompiledScene scene = scenes::compile(session.scene);
   controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings,
-                                                         arm.network, indices_in(arm.network, arm.interfaces.size()));
+                                                         arm.network, indices_in(arm.network, arm.interfaces.size()),
+                                                         controller::opener_of(fieldbus::ModbusPeers::on_this_machine),
+                                                         controller::opener_of(fieldbus::UdpPeers::any));
   bring_up_devices(arm.network, parts, [&](std::size_t bus) {
     std::vector<std::uint32_t> ids;
     for (const fieldbus::DriveSlot& slot : parts.can_drives) {

@@ -169,8 +169,11 @@ std::string cell_text(const description::Cell& cell, const std::vector<std::stri
       "# thumb: rotor inertia, gears, friction, and torque where the URDF doesn't say it. `simulation` is for that "
       "alone.\n" +
       drives_text(cell.drives);
-  text += "\nsensor:\n  description: sensor.yaml\n  bus: " + cell.sensor.bus + "\n" + sensor_keys +
-          "  link: " + scalar(cell.sensor.link) +
+  text += "\nsensor:\n  description: sensor.yaml\n" +
+          (cell.sensor.on_udp()
+               ? "  host: " + cell.sensor.host + "  # of the simulated sensor; a real one has its own address\n"
+               : "  bus: " + cell.sensor.bus + "\n") +
+          sensor_keys + "  link: " + scalar(cell.sensor.link) +
           "\n  # z of the sensor points out of the arm, along its last joint's axis.\n  pose_link: " +
           pose(cell.sensor.pose_link) + "\n  noise_N: 0.02\n  noise_Nm: 0.001\n";
   text += "\nlimits:\n  max_tool_speed_m_per_s: 0.5\n  max_tool_acceleration_m_per_s2: 20\n  max_force_N: " +

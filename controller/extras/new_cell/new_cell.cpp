@@ -123,6 +123,7 @@ class NewCell {
                         .expected = "one on CAN, such as ati_net_can_oem",
                         .advice = "models/cells/rail.yaml shows a cell with Modbus lines"});
     }
+    if (sensor_.described && sensor_.described->datagrams) cell_.sensor.host = "127.0.0.1";
     fs::copy_file(file, folder_ / "sensor.yaml", fs::copy_options::overwrite_existing);
     if (sensor_.protocol == "ati_net_can_oem") {
       // With this base id the sensor's frames are sent before all other frames on a shared bus.
@@ -315,7 +316,7 @@ class NewCell {
       cell_.drives[static_cast<std::size_t>(i)].bus =
           cell_.buses[static_cast<std::size_t>(std::min(i / each, count - 1))].name;
     }
-    cell_.sensor.bus = cell_.buses.back().name;
+    if (!cell_.sensor.on_udp()) cell_.sensor.bus = cell_.buses.back().name;
   }
 
   // Returns whether this number of buses carries this timestep. Leaves the cell with the shortest receive window that

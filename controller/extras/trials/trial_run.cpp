@@ -90,9 +90,9 @@ class TrialArm {
     const auto open_line = [this](const description::ModbusLineDescription& line, double) {
       return far_end_.modbus_client(line.name);
     };
-    controller::CycleParts parts =
-        controller::build_parts(session.cell, session.sensor, scene, session.settings, network_,
-                                controller::buses_in_order(session.cell), open_line);
+    controller::CycleParts parts = controller::build_parts(
+        session.cell, session.sensor, scene, session.settings, network_, controller::buses_in_order(session.cell),
+        open_line, [this](const auto&) { return far_end_.datagram_port(); });
     controller::bring_up(parts,
                          [this](fieldbus::ModbusLine& line) { controller::pump(network_, line, network_.now_ns()); });
     controller::Cycle cycle(std::move(parts), session.settings, session.cell.limits, 64);
