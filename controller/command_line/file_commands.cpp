@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -99,10 +99,7 @@ const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOpti
         "the laws of its objects, tried with a point; whether its tool fits is told by `proxarm check CELL --scene`\n",
         stdout);
   }
-  // Whether an object is doubtfully far away depends on where the tool starts, so it is judged only together with a
-  // cell.
-  const double anywhere_m = std::numeric_limits<double>::infinity();
-  tell(controller::scene_doubts(scene, models::Vec3::Zero(), anywhere_m));
+  tell(controller::scene_doubts(scene, std::nullopt));  // places are judged together with a cell
   if (!scene.tool) tell_joined(scene);
   tell_meshes(scene);
   return check_laws(scene, options);
@@ -193,7 +190,7 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       check_tool(file);
       return "tool";
     case controller::FileKind::hand:
-      tell(controller::hand_doubts(description::load_hand(file)));
+      tell(controller::hand_doubts(description::load_hand(file), std::nullopt));
       return "hand";
     case controller::FileKind::urdf:
       models::compile(models::load_urdf(file));

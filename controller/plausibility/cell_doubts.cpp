@@ -28,10 +28,9 @@ void judge_pose(const std::string& key, const description::PoseDescription& pose
 void judge_gravity(const description::Cell& cell, Lines& lines) {
   const std::array<double, 3>& g = cell.gravity_W_m_per_s2;
   const double size = std::hypot(g[0], g[1], g[2]);
-  if (size == 0.0) return;  // an arm without gravity, for tests
   const std::string key = "gravity_W_m_per_s2";
   judge(key, size, {9.7, 9.9, "m/s²", {units::gravities, units::mm_per_s2, {"cm/s²", 1e-2}}}, lines);
-  if (g[2] > -0.9 * size) {
+  if (size > 0.0 && g[2] > -0.9 * size) {
     lines.push_back(
         key + ": found " + description::rounded_text(g[2]) +
         " m/s² along z, which is up, expected what points down: an arm on a wall or a ceiling is turned by base_W");
@@ -71,6 +70,11 @@ void judge_counts(const std::string& key, const description::DriveDescription& d
   if (joint.slides || !(ratio > 0.0)) return;
   const OtherUnit inverted{"revolutions of the joint for one of the motor", 1.0 / (ratio * ratio)};
   judge(key + ".gear_ratio", ratio, {0.5, 5000.0, "", {inverted}}, lines);
+  if (ratio <= 1.0 || ratio > 5000.0) return;  // a direct drive may be slow
+  const double rpm = drive.max_speed_rad_per_s * ratio * 60.0 / (2.0 * pi);
+  judge(key + ".gear_ratio", ratio,
+        {"", rpm, 1.0, "with which the motor turns at most " + description::rounded_text(rpm) + " times a minute"},
+        {60.0, 1e5, "", {}}, lines);
 }
 
 // Judges a gear's damping by the damping ratio that it gives stiffness and inertia.

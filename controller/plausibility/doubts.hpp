@@ -6,6 +6,7 @@
 // are narrower than the ratios between units that people confuse.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,13 +21,27 @@ namespace proxarm::controller {
 // Precondition: `arm` is built from `cell`.
 std::vector<std::string> cell_doubts(const description::Cell& cell, const models::Arm& arm);
 
-std::vector<std::string> hand_doubts(const description::HandDescription& hand);
-
 // Register numbers of a map that look as if they were counted from 40001, as in manuals.
 std::vector<std::string> register_doubts(const description::ModbusDriveDescription& drive);
 
-// start_W: the tool's place at the start, m. reach_m: an upper bound of the distance of any of the arm's points from
-// the arm's base.
-std::vector<std::string> scene_doubts(const scenes::Scene& scene, const models::Vec3& start_W, double reach_m);
+// Where an arm's tool can be.
+struct ToolReach {
+  // The tool is never further than radius_m from the axis of a first joint that turns.
+  struct FirstAxis {
+    models::Vec3 through_W = models::Vec3::Zero(), direction_W = models::Vec3::UnitZ();
+    double radius_m = 0.0;
+
+    // Returns how far a point is beyond the tool's reach, m; negative within it.
+    [[nodiscard]] double beyond_m(const models::Vec3& point_W) const noexcept;
+  };
+  models::Vec3 start_W = models::Vec3::Zero();  // the tool's place at the start
+  double most_m = 0.0;                          // largest distance of any joint's axis from the tool, in any pose
+  std::optional<FirstAxis> first_axis;          // empty if the first joint slides
+};
+ToolReach tool_reach(const models::Arm& arm);
+
+// Without a reach, places aren't judged.
+std::vector<std::string> hand_doubts(const description::HandDescription& hand, const std::optional<ToolReach>& reach);
+std::vector<std::string> scene_doubts(const scenes::Scene& scene, const std::optional<ToolReach>& reach);
 
 }  // namespace proxarm::controller

@@ -42,10 +42,40 @@ std::optional<double> distance_m(const scenes::Shape& shape, const Vec3& from_W)
   return std::nullopt;
 }
 
+// Returns the radius of a round shape, m; 0 for other shapes.
+double radius_of(const scenes::Shape& shape) {
+  if (const auto* sphere = std::get_if<scenes::SphereShape>(&shape)) return sphere->radius_m;
+  if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&shape)) return capsule->radius_m;
+  if (const auto* cylinder = std::get_if<scenes::CylinderShape>(&shape)) return cylinder->radius_m;
+  return 0.0;
+}
+
+// A ball around a box, sphere, capsule or cylinder.
+struct Ball {
+  Vec3 centre_W;
+  double radius_m;
+};
+std::optional<Ball> ball_around(const scenes::Shape& shape) {
+  if (const auto* box = std::get_if<scenes::BoxShape>(&shape)) {
+    return Ball{box->pose_W.translation(), 0.5 * box->size_m.norm()};
+  }
+  if (const auto* sphere = std::get_if<scenes::SphereShape>(&shape)) return Ball{sphere->centre_m, sphere->radius_m};
+  const auto along = [](const auto& rod) {
+    return Ball{0.5 * (rod.from_m + rod.to_m), 0.5 * (rod.to_m - rod.from_m).norm() + rod.radius_m};
+  };
+  if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&shape)) return along(*capsule);
+  if (const auto* cylinder = std::get_if<scenes::CylinderShape>(&shape)) return along(*cylinder);
+  return std::nullopt;
+}
+
+std::string beyond_text(double beyond_m, const ToolReach::FirstAxis& axis) {
+  return description::rounded_text(beyond_m) + " m beyond the tool's reach, expected at most " +
+         description::rounded_text(axis.radius_m) + " m from the arm's first axis";
+}
+
 class SceneDoubts {
  public:
-  SceneDoubts(const scenes::Scene& scene, const Vec3& start_W, double reach_m)
-      : scene_(scene), start_W_(start_W), far_m_(far_reaches * reach_m) {}
+  SceneDoubts(const scenes::Scene& scene, const std::optional<ToolReach>& reach) : scene_(scene), reach_(reach) {}
 
   Lines operator()() {
     for (const scenes::Object& object : scene_.objects) judge_object(object);
@@ -72,10 +102,8 @@ class SceneDoubts {
     begin(object.line, object.name);
     value("friction", object.friction, friction);
     for (const scenes::FrictionRegion& region : object.friction_regions) value("friction", region.friction, friction);
-    if (const std::optional<double> far = distance_m(object.shape, start_W_); far && *far > far_m_) {
-      lines_.push_back(where_ + "it is " + description::rounded_text(*far) +
-                       " m from where the tool starts, far beyond the arm's reach: are its places in metres?");
-    }
+    if (radius_of(object.shape) > 0.0) value("radius_m", radius_of(object.shape), {1e-4, 1e4, "m", {}});
+    judge_place(object);
     if (object.layer) {
       value("layer.stiffness_N_per_m", object.layer->stiffness_N_per_m,
             {20.0, 1e8, "N/m", {{"N/mm", 1e3}, {"kN/m", 1e3}, {"N/µm", 1e6}}});
@@ -89,6 +117,22 @@ class SceneDoubts {
           {0.0, 20.0, "rad/s", {units::degrees_per_s}});
   }
 
+  void judge_place(const scenes::Object& object) {
+    if (!reach_) return;
+    const std::optional<double> far = distance_m(object.shape, reach_->start_W);
+    if (far && *far > far_reaches * reach_->most_m) {
+      lines_.push_back(where_ + "it is " + description::rounded_text(*far) +
+                       " m from where the tool starts, far beyond the arm's reach: are its places in metres?");
+      return;
+    }
+    const std::optional<Ball> ball = ball_around(object.shape);
+    if (!ball || !reach_->first_axis || object.motion || scene_.tool) return;
+    const double beyond_m = reach_->first_axis->beyond_m(ball->centre_W) - ball->radius_m;
+    if (beyond_m > 0.0) {
+      lines_.push_back(where_ + "it is " + beyond_text(beyond_m, *reach_->first_axis) + ": nothing can touch it");
+    }
+  }
+
   // How fast a swing moves the object at most.
   void judge_swing(const scenes::Motion& motion) {
     const double speed_m_per_s = 2.0 * std::numbers::pi * motion.frequency_Hz * motion.amplitude_m.norm();
@@ -98,19 +142,37 @@ class SceneDoubts {
   }
 
   const scenes::Scene& scene_;
-  Vec3 start_W_;
-  double far_m_;
+  const std::optional<ToolReach>& reach_;
   std::string where_;
   Lines lines_;
 };
 
 }  // namespace
 
-std::vector<std::string> scene_doubts(const scenes::Scene& scene, const Vec3& start_W, double reach_m) {
-  return SceneDoubts(scene, start_W, reach_m)();
+double ToolReach::FirstAxis::beyond_m(const Vec3& point_W) const noexcept {
+  return direction_W.cross(point_W - through_W).norm() - radius_m;
 }
 
-std::vector<std::string> hand_doubts(const description::HandDescription& hand) {
+ToolReach tool_reach(const models::Arm& arm) {
+  models::ToolKinematics at;
+  arm.kinematics(arm.start_rad(), at);
+  const models::JointMatrix bounds = arm.path_curvature();
+  const Vec3 tool_W = at.X_WT.translation(), origin_W = at.joint_W[0];
+  ToolReach reach{tool_W, std::max(bounds.maxCoeff(), 0.1), std::nullopt};
+  const Vec3 axis_W = at.J_W.col(0).tail<3>(), speed_W = at.J_W.col(0).head<3>();
+  // The drives' order may differ from the joints'; only if the first drive's joint is the first one, its axis stands
+  // still and goes through the first joint's origin.
+  constexpr double rounding_m = 1e-9;
+  const bool is_first = (axis_W.cross(tool_W - origin_W) - speed_W).norm() < rounding_m;
+  if (!arm.slides(0) && is_first) reach.first_axis = ToolReach::FirstAxis{origin_W, axis_W, bounds(0, 0)};
+  return reach;
+}
+
+std::vector<std::string> scene_doubts(const scenes::Scene& scene, const std::optional<ToolReach>& reach) {
+  return SceneDoubts(scene, reach)();
+}
+
+std::vector<std::string> hand_doubts(const description::HandDescription& hand, const std::optional<ToolReach>& reach) {
   Lines lines;
   judge("mass_kg", hand.mass_kg, {0.0, 30.0, "kg", {units::g}}, lines);
   if (hand.stiffness_N_per_m > 0.0) {
@@ -122,6 +184,12 @@ std::vector<std::string> hand_doubts(const description::HandDescription& hand) {
     for (const double x : waypoint.offset_m) judge("waypoints.offset_m", x, {-20.0, 20.0, "m", {units::mm}}, lines);
     for (const double x : waypoint.turn_rad) {
       judge("waypoints.turn_rad", x, {-10.0, 10.0, "rad", {units::degrees}}, lines);
+    }
+    if (!reach || !reach->first_axis) continue;
+    const double beyond_m = reach->first_axis->beyond_m(reach->start_W + Vec3(waypoint.offset_m.data()));
+    if (beyond_m > 0.0) {
+      lines.push_back("waypoints.offset_m: the one at " + description::rounded_text(waypoint.time_s) + " s is " +
+                      beyond_text(beyond_m, *reach->first_axis));
     }
   }
   for (const description::Sine& sine : hand.multisine) {

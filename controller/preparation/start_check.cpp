@@ -317,8 +317,7 @@ void require_runnable(const PreparedSession& session, const RunOptions& options)
 
 std::vector<std::string> surprises(const PreparedSession& session) {
   const models::Arm arm(session.cell);
-  // The arm's reach: the largest distance of a joint's axis from the tool in any pose.
-  const double reach_m = std::max(arm.path_curvature().maxCoeff(), 0.1);
+  const ToolReach reach = tool_reach(arm);
   std::vector<std::string> lines = cell_doubts(session.cell, arm);
   const auto add = [&](const std::vector<std::string>& more) { lines.insert(lines.end(), more.begin(), more.end()); };
   std::set<std::filesystem::path> maps;  // of registers; several drives may have one
@@ -326,15 +325,15 @@ std::vector<std::string> surprises(const PreparedSession& session) {
     if (drive.on_can() || !maps.insert(drive.description).second) continue;
     add(register_doubts(description::load_modbus_drive(drive.description)));
   }
-  add(scene_doubts(session.scene, arm.tool_pose(arm.start_rad()).translation(), reach_m));
-  add(hand_doubts(session.hand));
+  add(scene_doubts(session.scene, reach));
+  add(hand_doubts(session.hand, reach));
   add(weight_surprises(session, arm));
   add(hand_surprises(session));
-  if (session.scene.tool) add(tool_surprises(*session.scene.tool, reach_m));
+  if (session.scene.tool) add(tool_surprises(*session.scene.tool, reach.most_m));
   for (const scenes::Object& object : session.scene.objects) {
     const auto* const mesh = std::get_if<scenes::MeshShape>(&object.shape);
     if (mesh == nullptr || !mesh->mesh) continue;
-    for (const std::string& line : scenes::mesh_surprises(*mesh->mesh, reach_m, mesh->scale_m)) {
+    for (const std::string& line : scenes::mesh_surprises(*mesh->mesh, reach.most_m, mesh->scale_m)) {
       lines.push_back(session.scene.file.string() + ":" + std::to_string(object.line) + ": " + object.name + " (" +
                       mesh->file.filename().string() + "): " + line);
     }

@@ -21,6 +21,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 CELL = [
     ("gravity_W_m_per_s2: [0, 0, -9.80665]", "gravity_W_m_per_s2: [0, 0, 9.80665]"),
     ("gravity_W_m_per_s2: [0, 0, -9.80665]", "gravity_W_m_per_s2: [0, 0, -1]"),
+    ("gravity_W_m_per_s2: [0, 0, -9.80665]", "gravity_W_m_per_s2: [0, 0, 0]"),
     ("gravity_W_m_per_s2: [0, 0, -9.80665]", "gravity_W_m_per_s2: [0, 0, -9806.65]"),
     ("gravity_W_m_per_s2: [0, 0, -9.80665]", "gravity_W_m_per_s2: [0, 0, -0.980665]"),
     ("base_W: {position_m: [0, 0, 0]", "base_W: {position_m: [0, 0, 850]"),
@@ -37,6 +38,7 @@ CELL = [
     ("counts_per_motor_revolution: 1048576", "counts_per_motor_revolution: 20"),
     ("gear_ratio: 150", "gear_ratio: 0.00667"),
     ("gear_ratio: 150", "gear_ratio: -150"),
+    ("gear_ratio: 150", "gear_ratio: 1.5"),
     ("direction: 1", "direction: 0"),
     ("direction: 1", "direction: true"),
     ("range_rad: [-2.9, 2.9]", "range_rad: [-166, 166]"),
@@ -118,6 +120,7 @@ CELL = [
     ("default_period_s: 0.001", "default_period_s: 1ms"),
     ("node: 2\n", "node: 1\n"),
 ]
+WALL = "plane: {name: wall, point_m: [0.9, 0, 0.6], normal: [-1, 0, 0]"
 SCENE = [
     ("friction: 0.3", "friction: 30"),
     ("friction: 0.3", "friction: -0.3"),
@@ -132,6 +135,9 @@ SCENE = [
     ("friction: 0.3", "friction: 0,3"),
     ("point_m: [0.9, 0, 0.6]", "point_m: [9, 0, 6]", "wall"),
     ("friction: 0.3}", "friction: 0.3, motion: {swing: {amplitude_m: [0.05, 0, 0], frequency_Hz: 200}}}", "frequency_Hz"),
+    (WALL, "sphere: {name: ball, centre_m: [2.3, 0, 0.6], radius_m: 0.1", "ball"),
+    (WALL, "box: {name: block, centre_m: [0, 2.3, 0.6], size_m: [0.3, 0.3, 0.3]", "block"),
+    (WALL, "sphere: {name: ball, centre_m: [0.9, 0, 0.6], radius_m: 0.00005", "radius_m"),
 ]
 HAND = [
     ("mass_kg: 1.0", "mass_kg: 1000"),
@@ -139,6 +145,7 @@ HAND = [
     ("damping_Ns_per_m: 20", "damping_Ns_per_m: 20000"),
     ("damping_Ns_per_m: 20", "damping_Ns_per_m: 20\nmax_force_N: 0.06", "max_force_N"),
     ("offset_m: [0.18, 0, 0]", "offset_m: [180, 0, 0]"),
+    ("offset_m: [0.18, 0, 0]", "offset_m: [1.8, 0, 0]"),
     ("time_s: 2.7", "time_s: 2.4"),
     ("time_s: 0.5", "time_s: 500"),
     ("offset_m: [0.18, 0, 0]", "offset_m: [18, 0, 0]"),
