@@ -21,20 +21,14 @@ namespace {
 
 using namespace proxarm;
 using command_line::CommandApp;
-using controller::add_arm_option;
 using controller::add_enabling_option;
 using controller::add_fault_option;
-using controller::add_hardware_option;
 using controller::add_quantity;
 using controller::add_run_options;
 using controller::add_session_options;
-using controller::add_turning_options;
 using controller::add_view_options;
-using controller::add_without_enabling;
-using controller::choice;
 using controller::leave_out;
 using controller::RunOptions;
-using controller::whole_number;
 
 void add_check_options(CLI::App& app, scenes::CheckOptions& options) {
   app.add_option("--states", options.states, "random states in which each object of a scene, and the whole, is tried")

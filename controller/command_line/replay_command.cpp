@@ -54,6 +54,14 @@ class Replay {
                         .found = std::to_string(cell_.drives.size()) + " drives",
                         .expected = std::to_string(head.axes) + ", as recorded"});
     }
+    const auto recorded = [&](std::uint8_t bus) { return bus < head.buses; };
+    if (!std::all_of(head.bus_of_cell_bus.begin(),
+                     head.bus_of_cell_bus.begin() + static_cast<std::ptrdiff_t>(cell_.buses.size()), recorded)) {
+      throw SetupError({.file = cell_.file.string(),
+                        .key = "buses",
+                        .found = std::to_string(cell_.buses.size()),
+                        .expected = std::to_string(head.buses) + ", as recorded"});
+    }
     controller::BusIndices indices(head.bus_of_cell_bus.begin(),
                                    head.bus_of_cell_bus.begin() + static_cast<std::ptrdiff_t>(cell_.buses.size()));
     const auto open_line = [](const description::ModbusLineDescription&, double) { return std::make_unique<NoLine>(); };

@@ -28,17 +28,17 @@ void put(std::array<char, N>& text, const std::string& value) {
 
 }  // namespace
 
-BoxSize box_size(const controller::PreparedSession& session, bool timestep_may_change) {
+BoxSize box_size(const PreparedSession& session, bool timestep_may_change) {
   const double period_s = session.settings.period_s;
   return {timestep_may_change ? std::min(period_s, 1e-3) : period_s, frames_per_cycle(session.cell)};
 }
 
-fs::path black_box_folder(const controller::RunOptions& options) {
+fs::path black_box_folder(const RunOptions& options) {
   if (!options.black_box_dir.empty() || options.record_dir.empty()) return options.black_box_dir;
   return options.record_dir / "black-box";
 }
 
-ReplayHead replay_head(const controller::PreparedSession& session, const std::vector<std::string>& bus_names,
+ReplayHead replay_head(const PreparedSession& session, const std::vector<std::string>& bus_names,
                        const BusIndices& indices) {
   ReplayHead head;
   head.settings = session.settings;
@@ -58,7 +58,7 @@ ReplayHead replay_head(const controller::PreparedSession& session, const std::ve
   return head;
 }
 
-std::vector<fs::path> replay_files(const controller::PreparedSession& session) {
+std::vector<fs::path> replay_files(const PreparedSession& session) {
   std::vector<fs::path> files{session.cell.file, session.cell.urdf, session.scene.file, session.sensor.file,
                               session.hand.file};
   files.insert(files.end(), session.hand.data_files.begin(), session.hand.data_files.end());
@@ -80,10 +80,10 @@ std::vector<fs::path> replay_files(const controller::PreparedSession& session) {
 }
 
 void write_black_box(const fs::path& folder, const BlackBox& box, const ReplayHead& head,
-                     const controller::PreparedSession& session, const std::string& reason, Replay replay) {
+                     const PreparedSession& session, const std::string& reason, Replay replay) {
   SessionWriter files(folder, joint_names(session.cell), false);
   files.write_file("reason.txt", reason + "\n");
-  files.write_file("effective.yaml", controller::effective_config(session));
+  files.write_file("effective.yaml", effective_config(session));
   if (replay == Replay::kept) {
     ReplayRecorder recorder(box, folder, replay_files(session));
     recorder.drain(head);

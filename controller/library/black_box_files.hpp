@@ -21,22 +21,21 @@ struct BoxSize {
   std::size_t frames_per_cycle;
 };
 // If the timestep may change, the box has room for cycles down to 1 ms.
-BoxSize box_size(const controller::PreparedSession& session, bool timestep_may_change);
+BoxSize box_size(const PreparedSession& session, bool timestep_may_change);
 
 // The folder of --black-box, else one in the folder of --record; empty: neither is given.
-std::filesystem::path black_box_folder(const controller::RunOptions& options);
+std::filesystem::path black_box_folder(const RunOptions& options);
 
 // Returns the head of the session's replay; its first cycle and state aren't filled in. Throws SetupError.
-ReplayHead replay_head(const controller::PreparedSession& session, const std::vector<std::string>& bus_names,
+ReplayHead replay_head(const PreparedSession& session, const std::vector<std::string>& bus_names,
                        const BusIndices& indices);
 // Returns all files from which the session was prepared.
-std::vector<std::filesystem::path> replay_files(const controller::PreparedSession& session);
+std::vector<std::filesystem::path> replay_files(const PreparedSession& session);
 
 enum class Replay : std::uint8_t { none, kept };
 
 // Writes the last seconds of the session to `folder`. Throws SetupError.
 void write_black_box(const std::filesystem::path& folder, const BlackBox& box, const ReplayHead& head,
-                     const controller::PreparedSession& session, const std::string& reason,
-                     Replay replay = Replay::kept);
+                     const PreparedSession& session, const std::string& reason, Replay replay = Replay::kept);
 
 }  // namespace proxarm::controller

@@ -6,13 +6,11 @@
 
 namespace proxarm::controller {
 
-LedPoses::LedPoses(const controller::PreparedSession& session, const controller::RunOptions& options,
-                   const SignalDeriver& deriver)
+LedPoses::LedPoses(const PreparedSession& session, const RunOptions& options, const SignalDeriver& deriver)
     : session_(session),
       options_(options),
       deriver_(deriver),
-      watch_(PassedPoses(deriver.arm(), session.cell, controller::hand_model(session), session.loop,
-                         controller::turned_model(session))),
+      watch_(PassedPoses(deriver.arm(), session.cell, hand_model(session), session.loop, turned_model(session))),
       loop_(session.loop) {
   if (options.view_place || !options.record_dir.empty()) watch_.find_smallest();
 }
@@ -27,7 +25,7 @@ void LedPoses::follow_timestep(const CycleRecord& record) {
   const bool refused = record.refused_period_ns > 0;
   if (refused || record.has(RecordFlag::timestep) || record.period_ns == period_ns_) return;
   if (period_ns_ > 0) {
-    loop_ = controller::with_timestep(session_, options_, 1e-9 * static_cast<double>(record.period_ns)).loop;
+    loop_ = with_timestep(session_, options_, 1e-9 * static_cast<double>(record.period_ns)).loop;
     watch_.change(judged_loop());
   }
   period_ns_ = record.period_ns;

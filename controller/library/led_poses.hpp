@@ -15,8 +15,7 @@ namespace proxarm::controller {
 class LedPoses {
  public:
   // Precondition: all arguments outlive this object.
-  LedPoses(const controller::PreparedSession& session, const controller::RunOptions& options,
-           const SignalDeriver& deriver);
+  LedPoses(const PreparedSession& session, const RunOptions& options, const SignalDeriver& deriver);
 
   // Takes every record, in order.
   void add(const CycleRecord& record);
@@ -33,8 +32,8 @@ class LedPoses {
   void pass(const CycleRecord& record);
   [[nodiscard]] LoopModel judged_loop() const;
 
-  const controller::PreparedSession& session_;
-  const controller::RunOptions& options_;
+  const PreparedSession& session_;
+  const RunOptions& options_;
   const SignalDeriver& deriver_;
   PoseWatch watch_;
   LoopModel loop_;  // of the present timestep, with samples in time

@@ -2,7 +2,7 @@
 //
 //   {{"scene", "scenes/wall.yaml"}, {"mass", 5.0}, {"duration", 6.0}, {"fault", {"axis_2:silent@2s"}}}
 //
-// The command line's table reads them (command_line/options/run_words.hpp), so names, values and error messages are the
+// The command line's table reads them (controller/options/run_words.hpp), so names, values and error messages are the
 // command line's.
 #pragma once
 

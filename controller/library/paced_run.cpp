@@ -9,13 +9,12 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-bool is_realtime(const controller::RunOptions& options) { return options.pace == controller::Pace::realtime; }
+bool is_realtime(const RunOptions& options) { return options.pace == Pace::realtime; }
 
 }  // namespace
 
-PacedRun run_at_pace(SimulatedLoop& loop, const controller::PreparedSession& session,
-                     const controller::RunOptions& options, const LookAtCycle& look,
-                     const std::function<void(std::int64_t t_k_ns)>& before) {
+PacedRun run_at_pace(SimulatedLoop& loop, const PreparedSession& session, const RunOptions& options,
+                     const LookAtCycle& look, const std::function<void(std::int64_t t_k_ns)>& before) {
   PacedRun run;
   const SteadyClock::time_point begun = SteadyClock::now();
   if (is_realtime(options)) loop.network().follow_real_time();  // from now on: earlier time belongs to no cycle
@@ -29,8 +28,7 @@ PacedRun run_at_pace(SimulatedLoop& loop, const controller::PreparedSession& ses
   return run;
 }
 
-void add_figures(Summary& summary, const PacedRun& run, const SimulatedLoop& loop,
-                 const controller::RunOptions& options) {
+void add_figures(Summary& summary, const PacedRun& run, const SimulatedLoop& loop, const RunOptions& options) {
   summary.wall_time_s = run.wall_s;
   summary.overruns = run.tally.overruns;
   summary.virtual_time = !is_realtime(options);

@@ -20,12 +20,10 @@ struct PacedRun {
 
 // Precondition: loop.start() was called. `look` sees each cycle's record; `before` is called before each cycle, at its
 // time. Throws SetupError if the simulation has become unstable.
-PacedRun run_at_pace(SimulatedLoop& loop, const controller::PreparedSession& session,
-                     const controller::RunOptions& options, const LookAtCycle& look,
-                     const std::function<void(std::int64_t t_k_ns)>& before);
+PacedRun run_at_pace(SimulatedLoop& loop, const PreparedSession& session, const RunOptions& options,
+                     const LookAtCycle& look, const std::function<void(std::int64_t t_k_ns)>& before);
 
 // Adds the figures of the run's time and of the buses to a session's summary.
-void add_figures(Summary& summary, const PacedRun& run, const SimulatedLoop& loop,
-                 const controller::RunOptions& options);
+void add_figures(Summary& summary, const PacedRun& run, const SimulatedLoop& loop, const RunOptions& options);
 
 }  // namespace proxarm::controller

@@ -2,7 +2,7 @@
 
 namespace proxarm::controller {
 
-RecordedMessages::RecordedMessages(const std::filesystem::path& folder, const controller::PreparedSession& session)
+RecordedMessages::RecordedMessages(const std::filesystem::path& folder, const PreparedSession& session)
     : stage_(session.cell, session.scene,
              {.period_s = session.settings.period_s,
               .mass_kg = session.settings.mass_kg,

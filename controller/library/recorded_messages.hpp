@@ -12,7 +12,7 @@ namespace proxarm::controller {
 class RecordedMessages {
  public:
   // Creates the file. Throws SetupError.
-  RecordedMessages(const std::filesystem::path& folder, const controller::PreparedSession& session);
+  RecordedMessages(const std::filesystem::path& folder, const PreparedSession& session);
   // Writes a cycle. Precondition: the record is complete, as SessionOutput::add() returns it.
   void add(const CycleRecord& completed) { record_.add(completed); }
   void drain(const BoxReader& box) { record_.drain(box); }

@@ -26,20 +26,20 @@ void require_plot_file(const fs::path& file) {
   if (access(folder.c_str(), W_OK) != 0 || fs::is_directory(file, ignored)) refuse("a file that can be written");
 }
 
-SessionFiles::SessionFiles(const controller::PreparedSession& session, const controller::RunOptions& options,
-                           const BlackBox& box, Replay replay)
+SessionFiles::SessionFiles(const PreparedSession& session, const RunOptions& options, const BlackBox& box,
+                           Replay replay)
     : session_(session),
       options_(options),
       box_(box),
       kept_replay_(replay),
-      head_(replay_head(session, controller::bus_names(session.cell), controller::buses_in_order(session.cell))),
+      head_(replay_head(session, bus_names(session.cell), buses_in_order(session.cell))),
       deriver_(session.cell) {
   if (!options.black_box_dir.empty()) SessionWriter(options.black_box_dir, {}, false);
   const bool draws = !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && draws) plot_ = std::make_unique<PlotBuilder>(plot_title(session));
   if (options.record_dir.empty()) return;
   writer_ = std::make_unique<SessionWriter>(options.record_dir, joint_names(session.cell), true, options.signals);
-  writer_->write_file("effective.yaml", controller::effective_config(session));
+  writer_->write_file("effective.yaml", effective_config(session));
   if (replay == Replay::kept)
     replay_ = std::make_unique<ReplayRecorder>(box, options.record_dir, replay_files(session));
   messages_ = std::make_unique<RecordedMessages>(options.record_dir, session);

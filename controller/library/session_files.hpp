@@ -25,8 +25,7 @@ class SessionFiles {
  public:
   // Makes the record's folder; throws SetupError. A session with its own world, sensor or drives has no replay, which
   // is computed from files alone. Precondition: session, options and box outlive this object.
-  SessionFiles(const controller::PreparedSession& session, const controller::RunOptions& options, const BlackBox& box,
-               Replay replay);
+  SessionFiles(const PreparedSession& session, const RunOptions& options, const BlackBox& box, Replay replay);
 
   [[nodiscard]] const SignalDeriver& deriver() const noexcept { return deriver_; }
   [[nodiscard]] bool keeps_frames() const noexcept { return writer_ != nullptr; }
@@ -40,8 +39,8 @@ class SessionFiles {
   void write_box(Summary& summary) const;
   void draw(const Summary& summary) const;
 
-  const controller::PreparedSession& session_;
-  const controller::RunOptions& options_;
+  const PreparedSession& session_;
+  const RunOptions& options_;
   const BlackBox& box_;
   Replay kept_replay_;
   ReplayHead head_;

@@ -18,7 +18,7 @@ std::vector<std::string> joint_names(const description::Cell& cell) {
   return names;
 }
 
-SummaryConfig summary_config(const controller::PreparedSession& session) {
+SummaryConfig summary_config(const PreparedSession& session) {
   SummaryConfig config;
   config.period_s = session.settings.period_s;
   config.wanted_mass_kg = session.settings.mass_kg;
@@ -26,22 +26,21 @@ SummaryConfig summary_config(const controller::PreparedSession& session) {
   config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   config.spring_N_per_m = session.settings.spring_N_per_m;
   if (session.settings.orientation == OrientationMode::free) {
-    config.wanted_inertia_kg_m2 = controller::felt_inertia_kg_m2(session);
+    config.wanted_inertia_kg_m2 = felt_inertia_kg_m2(session);
     config.turning_spring_Nm_per_rad = session.settings.rotational_spring_Nm_per_rad;
   }
   // What is looked ahead isn't behind.
   config.lookahead_s = session.settings.horizon_s;
   config.gear_damping_per_s = session.settings.gear_damping_per_s;
-  config.setpoint_filter_s =
-      controller::motion_delay_s(session) - 2.0 * session.settings.period_s - session.settings.horizon_s;
-  const double behind_s = std::max(0.0, controller::motion_delay_s(session) - session.settings.horizon_s);
+  config.setpoint_filter_s = motion_delay_s(session) - 2.0 * session.settings.period_s - session.settings.horizon_s;
+  const double behind_s = std::max(0.0, motion_delay_s(session) - session.settings.horizon_s);
   config.setpoint_delay_cycles = static_cast<int>(std::lround(behind_s / session.settings.period_s));
   config.passivity = session.settings.passivity != Passivity::off;
   config.axis_names = joint_names(session.cell);
   return config;
 }
 
-void complete(CycleRecord& record, const controller::PreparedSession& session, std::int64_t rendered_ns) {
+void complete(CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns) {
   if (session.rigid) return add_clearances(record, *session.rigid, rendered_ns);
   add_clearances(record, session.scene, *session.clearances, rendered_ns);
   if (!session.impedance()) return;
@@ -115,8 +114,7 @@ FaultSummary final_fault(const Cycle& cycle, const description::Cell& cell) {
 }
 
 // The session's end in words; one that somebody asked for has its own.
-EndSummary end_summary(SessionEnd end, const EndSummary& asked, const controller::PreparedSession& session,
-                       double rendered_s) {
+EndSummary end_summary(SessionEnd end, const EndSummary& asked, const PreparedSession& session, double rendered_s) {
   char text[160], of_wanted[64];
   std::snprintf(of_wanted, sizeof of_wanted, "; %.4g of %.4g s were rendered", rendered_s, session.duration_s);
   switch (end) {
@@ -160,7 +158,7 @@ void add_faults(Summary& summary, const Cycle& cycle, const description::Cell& c
 
 }  // namespace
 
-SessionLength session_length(const controller::PreparedSession& session, const controller::RunOptions& options) {
+SessionLength session_length(const PreparedSession& session, const RunOptions& options) {
   SessionLength length{session.duration_s};
   const bool somebody_presses =
       session.cell.enabling_input && !session.settings.without_enabling_input && !options.bus.simulated();
@@ -168,7 +166,7 @@ SessionLength session_length(const controller::PreparedSession& session, const c
   return length;
 }
 
-std::string rendered_text(const controller::PreparedSession& session) {
+std::string rendered_text(const PreparedSession& session) {
   const SessionSettings& s = session.settings;
   char text[96];
   if (session.impedance()) {
@@ -180,14 +178,14 @@ std::string rendered_text(const controller::PreparedSession& session) {
   return text;
 }
 
-std::string plot_title(const controller::PreparedSession& session) {
+std::string plot_title(const PreparedSession& session) {
   char period[32];
   std::snprintf(period, sizeof period, ", T = %.4g ms", 1e3 * session.settings.period_s);
   return session.scene.name + ": " + rendered_text(session) + period;
 }
 
 Summary session_summary(SummaryBuilder& builder, const Cycle& cycle, SessionEnd end, const EndSummary& asked,
-                        const controller::PreparedSession& session) {
+                        const PreparedSession& session) {
   Summary summary = builder.finish();
   summary.end = end_summary(end, asked, session, summary.rendered_time_s);
   summary.drives_lack = fieldbus::losses_of(cycle.parts().can_drives);
@@ -197,13 +195,13 @@ Summary session_summary(SummaryBuilder& builder, const Cycle& cycle, SessionEnd 
   return summary;
 }
 
-void add_idle_orders(Summary& summary, const Cycle& cycle, const controller::RunOptions& options) {
+void add_idle_orders(Summary& summary, const Cycle& cycle, const RunOptions& options) {
   for (const ScheduledCommand& order : cycle.scheduled_commands()) {
     if (order.taken && order.refusal == nullptr) continue;
-    summary.idle_orders.push_back({controller::order_name(order.request.order), static_cast<double>(order.at_ns) / 1e9,
+    summary.idle_orders.push_back({order_name(order.request.order), static_cast<double>(order.at_ns) / 1e9,
                                    order.taken ? order.refusal : "the session had ended before"});
   }
-  for (const controller::IdleChange& change : controller::idle_changes(cycle, options.changes)) {
+  for (const IdleChange& change : idle_changes(cycle, options.changes)) {
     summary.idle_orders.push_back({"set " + change.text, change.time_s, change.refusal});
   }
 }

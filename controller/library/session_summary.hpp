@@ -15,23 +15,23 @@
 namespace proxarm::controller {
 
 std::vector<std::string> joint_names(const description::Cell& cell);
-SummaryConfig summary_config(const controller::PreparedSession& session);
+SummaryConfig summary_config(const PreparedSession& session);
 // Fills in what only the scene knows, distances and friction, after so much rendering.
-void complete(CycleRecord& record, const controller::PreparedSession& session, std::int64_t rendered_ns);
+void complete(CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns);
 
 // Returns the session's length. If no person can end a release, the length also has the longest time of a release.
-SessionLength session_length(const controller::PreparedSession& session, const controller::RunOptions& options);
+SessionLength session_length(const PreparedSession& session, const RunOptions& options);
 
 // What is rendered, in a few words: "4 kg felt"; and with scene and timestep, above a plot.
-std::string rendered_text(const controller::PreparedSession& session);
-std::string plot_title(const controller::PreparedSession& session);
+std::string rendered_text(const PreparedSession& session);
+std::string plot_title(const PreparedSession& session);
 
 // Of all that was added to `builder` and what the cycle found; the caller fills in what only it knows. `asked`: who
 // asked for the end, of SessionEnd::asked.
 Summary session_summary(SummaryBuilder& builder, const Cycle& cycle, SessionEnd end, const EndSummary& asked,
-                        const controller::PreparedSession& session);
+                        const PreparedSession& session);
 
 // What the session's script said and didn't come to pass.
-void add_idle_orders(Summary& summary, const Cycle& cycle, const controller::RunOptions& options);
+void add_idle_orders(Summary& summary, const Cycle& cycle, const RunOptions& options);
 
 }  // namespace proxarm::controller

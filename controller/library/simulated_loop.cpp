@@ -55,7 +55,7 @@ void require_joints(const OwnParts& own, const description::Cell& cell) {
   }
 }
 
-void require_replaceable(const controller::PreparedSession& session, std::size_t axis) {
+void require_replaceable(const PreparedSession& session, std::size_t axis) {
   const description::DriveDescription& drive = session.cell.drives[axis];
   if (drive.on_can() && !session.impedance()) return;
   throw SetupError({.file = session.cell.file.string(),
@@ -66,7 +66,7 @@ void require_replaceable(const controller::PreparedSession& session, std::size_t
 
 }  // namespace
 
-void require_own_world_fits(const controller::PreparedSession& session) {
+void require_own_world_fits(const PreparedSession& session) {
   if (session.settings.looks_ahead) {
     throw SetupError({.key = "--lookahead", .found = "a world of one's own", .expected = "off with it"});
   }
@@ -81,12 +81,11 @@ void require_own_world_fits(const controller::PreparedSession& session) {
                     .expected = "an arm whose tool moves in space"});
 }
 
-controller::PreparedSession simulated_arm(const controller::PreparedSession& session,
-                                          const controller::RunOptions& options) {
+PreparedSession simulated_arm(const PreparedSession& session, const RunOptions& options) {
   if (options.arm.empty()) return session;
-  controller::RunOptions of_arm = options;
+  RunOptions of_arm = options;
   of_arm.cell = options.arm;
-  controller::PreparedSession arm = controller::prepare(of_arm);
+  PreparedSession arm = prepare(of_arm);
   const auto names = [](const description::Cell& cell) {
     std::string all;
     for (const auto& bus : cell.buses) all += bus.name + " ";
@@ -102,7 +101,7 @@ controller::PreparedSession simulated_arm(const controller::PreparedSession& ses
 
 namespace {
 
-const controller::PreparedSession& arm_of(const SimulatedFarEnd& far_end, const controller::PreparedSession& session) {
+const PreparedSession& arm_of(const SimulatedFarEnd& far_end, const PreparedSession& session) {
   return far_end.arm != nullptr ? *far_end.arm : session;
 }
 
@@ -114,8 +113,7 @@ bool is_possible(const sim::Truth& truth) noexcept {
 
 }  // namespace
 
-SimulatedLoop::SimulatedLoop(const controller::PreparedSession& session, const OwnParts& own,
-                             const SimulatedFarEnd& far_end)
+SimulatedLoop::SimulatedLoop(const PreparedSession& session, const OwnParts& own, const SimulatedFarEnd& far_end)
     : session_(session),
       own_(own),
       network_(sim::simulated_buses(arm_of(far_end, session).cell)),
@@ -133,9 +131,9 @@ void SimulatedLoop::start() {
   const ModbusOpener open_line = [this](const description::ModbusLineDescription& line, double) {
     return far_end_.modbus_client(line.name);
   };
-  CycleParts parts = build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_,
-                                 controller::buses_in_order(session_.cell), open_line,
-                                 [this](const auto&) { return far_end_.datagram_port(); });
+  CycleParts parts =
+      build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_, buses_in_order(session_.cell),
+                  open_line, [this](const auto&) { return far_end_.datagram_port(); });
   put_in(parts);
   far_end_.attach_to(network_);
   far_end_.power_on();
@@ -194,7 +192,7 @@ SessionTally SimulatedLoop::run(const LookAtCycle& look, const SessionLength& le
   return tally;
 }
 
-QuietEnd run_quietly(const controller::PreparedSession& session, const LookAtCycle& look) {
+QuietEnd run_quietly(const PreparedSession& session, const LookAtCycle& look) {
   SimulatedLoop loop(session);
   QuietEnd out;
   loop.start();

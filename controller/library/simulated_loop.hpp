@@ -49,27 +49,25 @@ struct OwnParts {
 
 // Throws SetupError for an arm whose tool can't move in space, for a tool with a shape, and for a lookahead: that steps
 // a second proxy through a scene which it compiles anew, and somebody's own 𝒢 is there only once.
-void require_own_world_fits(const controller::PreparedSession& session);
+void require_own_world_fits(const PreparedSession& session);
 
 // Sees each cycle's record, and the truth at its SYNC.
 using LookAtCycle = std::function<void(const CycleRecord&, const sim::Truth&)>;
 
 // What is simulated: the session's own cell, or that of --arm, which is wired as it is. Throws SetupError.
-controller::PreparedSession simulated_arm(const controller::PreparedSession& session,
-                                          const controller::RunOptions& options);
+PreparedSession simulated_arm(const PreparedSession& session, const RunOptions& options);
 
 // The far end, where it isn't just what the session takes it for.
 struct SimulatedFarEnd {
-  const controller::PreparedSession* arm = nullptr;  // simulated_arm(); null: the session
-  std::vector<sim::DeviceFault> faults;              // of its devices
-  std::vector<sim::PressedSpan> enabling;            // of its enabling switch
+  const PreparedSession* arm = nullptr;    // simulated_arm(); null: the session
+  std::vector<sim::DeviceFault> faults;    // of its devices
+  std::vector<sim::PressedSpan> enabling;  // of its enabling switch
 };
 
 class SimulatedLoop {
  public:
   // Throws SetupError. `session` must outlive the loop. Several loops may run at once, in different threads.
-  explicit SimulatedLoop(const controller::PreparedSession& session, const OwnParts& own = {},
-                         const SimulatedFarEnd& far_end = {});
+  explicit SimulatedLoop(const PreparedSession& session, const OwnParts& own = {}, const SimulatedFarEnd& far_end = {});
   SimulatedLoop(const SimulatedLoop&) = delete;
   SimulatedLoop& operator=(const SimulatedLoop&) = delete;
 
@@ -95,7 +93,7 @@ class SimulatedLoop {
   void put_in(CycleParts& parts);
   void look_at_truth(std::int64_t t_k_ns);
 
-  const controller::PreparedSession& session_;
+  const PreparedSession& session_;
   OwnParts own_;
   fieldbus::SimulatedCanNetwork network_;
   sim::SimulatedCell far_end_;
@@ -114,7 +112,7 @@ struct QuietEnd {
   std::string fault;  // its name; empty: none
   MotionWork work;    // all zero where nothing is counted
 };
-QuietEnd run_quietly(const controller::PreparedSession& session, const LookAtCycle& look);
+QuietEnd run_quietly(const PreparedSession& session, const LookAtCycle& look);
 
 // Fills in what only the simulation knows.
 void add_truth(CycleRecord& record, const sim::Truth& truth);

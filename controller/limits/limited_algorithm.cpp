@@ -15,12 +15,14 @@ void LimitedAlgorithm<N>::set_limits(const StepLimits& limits, const Eigen::Matr
 
 template <int N>
 auto LimitedAlgorithm<N>::operator()(double K, const V& p, const V& q) noexcept -> V {
-  V r = (*inner_)(K, p, q);
+  const V start = from(q);
+  V r = (*inner_)(K, p, start);
   squeezed_ = inner_->squeezed();
   active_ = {};
   soft_met_ = true;
   limit_shift_ = V::Zero();
-  if (!sets_.contains(r - q_k1_, tolerance_m, true) || !sets_.followed(r - q_k1_, r)) r = solve(K, p, q, r);
+  gave_way_ = false;
+  if (!sets_.contains(r - q_k1_, tolerance_m, true) || !sets_.followed(r - q_k1_, r)) r = solve(K, p, start, r);
   gather_contacts();
   return r;
 }
@@ -112,6 +114,7 @@ auto LimitedAlgorithm<N>::take(const Try& solution) noexcept -> V {
 template <int N>
 auto LimitedAlgorithm<N>::give_way(Step& step, const Try& last) noexcept -> V {
   active_ = last.l.active;
+  give_way_at(last.r);
   const V held = last.r - step.p - last.shift;  // the contacts' force divided by κ
   V l;
   if (sets_.contains(V::Zero(), tolerance_m, step.with_soft)) {

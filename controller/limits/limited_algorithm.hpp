@@ -14,7 +14,9 @@
 //   in turn   Block Gauss-Seidel, λ/κ ← l − (r − λ/κ). In turns 1, 2, 4, 8 … of this method, the methods joined and
 //             Newton are tried first.
 // If contacts and limits have no common point, the contacts give way: q is the limits' point nearest to the contacts'
-// point. If the limits alone have no common point, the soft limits (leash, power) give way.
+// point r. The steps that follow start the inner 𝒢 from r instead of q₁, until a step keeps the contacts again. So a
+// proxy that limits have put into an object comes out on the side on which it went in, also out of a mesh, whose faces
+// hold a proxy on both sides. If the limits alone have no common point, the soft limits (leash, power) give way.
 //
 // If no limit is active, the result equals the inner 𝒢's result to the bit. Nothing allocates, locks or throws.
 #pragma once
@@ -23,6 +25,7 @@
 #include <span>
 
 #include "controller/limits/limit_sets.hpp"
+#include "models/base/state_archive.hpp"
 #include "models/geometry/geometric_algorithm.hpp"
 
 namespace proxarm::controller {
@@ -43,6 +46,22 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
   void set_limits(const StepLimits& limits, const Eigen::Matrix<double, 3, N>& basis, const V& q_k1) noexcept;
 
   V operator()(double K, const V& p, const V& q) noexcept override;
+
+  // Returns the place from which contacts count in the next step: q, unless contacts have given way.
+  [[nodiscard]] const V& from(const V& q) const noexcept { return gave_way_ ? kept_ : q; }
+  // Call when the proxy is put to another place, which counts as outside all objects.
+  void start() noexcept { gave_way_ = false; }
+  // Call when the proxy is put to a place that contacts exclude: contacts count from `kept`.
+  void give_way_at(const V& kept) noexcept {
+    gave_way_ = true;
+    kept_ = kept;
+  }
+  // Takes over from which place contacts count.
+  void follow(const LimitedAlgorithm& other) noexcept {
+    gave_way_ = other.gave_way_;
+    kept_ = other.kept_;
+  }
+  void archive(fieldbus::StateArchive& state) noexcept { state(gave_way_, kept_); }
 
   void set_time(const models::StepTime& time) noexcept override { inner_->set_time(time); }
   [[nodiscard]] bool wants_time() const noexcept override { return inner_->wants_time(); }
@@ -123,6 +142,8 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
   ActiveLimits active_;
   bool soft_met_ = true;
   bool squeezed_ = false;
+  bool gave_way_ = false;  // the contacts gave way in the last step
+  V kept_ = V::Zero();     // the contacts' point of that step
   std::array<models::Contact<N>, 8> contacts_{};
   std::size_t count_ = 0;
 };

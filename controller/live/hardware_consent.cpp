@@ -37,8 +37,8 @@ std::string enabling_text(const PreparedSession& session) {
   return text.str();
 }
 
-// Prints what the person must have checked. `real` names the real interfaces and the real Modbus peers; `lines`: some
-// of them are Modbus peers.
+// Prints what the person must have checked. `real` names the real interfaces, the real Modbus peers and a real sensor's
+// UDP address; `lines`: some of them are Modbus peers.
 void print_checklist(const PreparedSession& session, const std::vector<std::string>& real, bool lines,
                      std::ostream& out) {
   const description::CellLimits& limits = session.cell.limits;

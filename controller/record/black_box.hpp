@@ -53,7 +53,7 @@ struct BoxCycle {
   Timestep timestep;
   std::array<BusInput, max_buses> buses{};
   std::uint16_t input_bytes = 0;
-  std::array<std::byte, 512> inputs{};  // CyclicDrive::archive_input() of all drives
+  std::array<std::byte, 512> inputs{};  // archive_input() of all drives, and of a sensor on UDP
   std::int64_t rendered_ns = 0;
   CycleRecord record;
 };

@@ -23,14 +23,16 @@ Lookahead<N>::Lookahead(const scenes::Scene& scene, const AdmittanceConfig& conf
       proxy_(config, limited_) {}
 
 template <int N>
-auto Lookahead<N>::operator()(const AdmittanceProxy<N>& proxy, const SceneChanges& changes, const V& h,
-                              const StepLimits& limits, const Basis& basis, double horizon_s) noexcept -> V {
+auto Lookahead<N>::operator()(const AdmittanceProxy<N>& proxy, const LimitedAlgorithm<N>& limited,
+                              const SceneChanges& changes, const V& h, const StepLimits& limits, const Basis& basis,
+                              double horizon_s) noexcept -> V {
   const double steps = std::min(horizon_s / proxy.config().period_s, static_cast<double>(most_steps));
   const int whole = static_cast<int>(std::floor(steps + rounding_steps));
   const double rest = std::max(0.0, steps - static_cast<double>(whole));
   const int count = rest > 0.0 ? whole + 1 : whole;
   if (count == 0) return proxy.q();
   proxy_.follow(proxy);
+  limited_.follow(limited);
   changes_.follow(changes);
   double reach_m = 0.0;
   for (std::size_t i = 0; i < limits.hard_count; ++i) {

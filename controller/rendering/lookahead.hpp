@@ -38,8 +38,8 @@ class Lookahead {
 
   // Returns p(k). `h`: force during the prediction. Precondition: called after the proxy's step, which was made within
   // `limits`. If a predicted step fails, returns the point before this step.
-  V operator()(const AdmittanceProxy<N>& proxy, const SceneChanges& changes, const V& h, const StepLimits& limits,
-               const Basis& basis, double horizon_s) noexcept;
+  V operator()(const AdmittanceProxy<N>& proxy, const LimitedAlgorithm<N>& limited, const SceneChanges& changes,
+               const V& h, const StepLimits& limits, const Basis& basis, double horizon_s) noexcept;
 
  private:
   void gather_limits(const StepLimits& limits, double reach_m) noexcept;

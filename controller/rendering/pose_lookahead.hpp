@@ -7,9 +7,9 @@
 //   p(k)   = 𝒢(K, (l, R), (q, R)):   one step of 𝒢 for the whole of H, with the orientation R held
 //
 // One step of 𝒢 instead of one for each period, since a step costs microseconds. At a flat face both give the same
-// place: the tool loses the speed v_n across the face, and μ v_n along it. Only a tool that would stick is sent less
-// far, by at most what it would still slide before the impact. The tool with orientation R is outside all objects at
-// p(k), so the arm is never sent into one.
+// place: the tool loses the speed v_n across the face, and μ v_n along it. A tool that would stick at the face is sent
+// less far along the face: its way before the impact is missing. At p(k) the tool with orientation R is outside all
+// objects, so the arm is never sent into one.
 //
 // 𝒢 is a clone, since 𝒢 has memory. Where objects move, the clone takes the state of the original before each
 // prediction; scripted objects go on for H, driven objects stay.
@@ -28,6 +28,9 @@ class PoseLookahead {
  public:
   // `g`: 𝒢 of the proxy that is predicted. Precondition: `g` outlives this object.
   explicit PoseLookahead(const models::PoseAlgorithm& g) : of_proxy_(&g), g_(g.clone()), limits_(no_world_) {}
+
+  PoseLookahead(const PoseLookahead&) = delete;  // limits_ refers to no_world_
+  PoseLookahead& operator=(const PoseLookahead&) = delete;
 
   void set_friction(std::int32_t object, double friction) noexcept { g_->set_friction(object, friction); }
 

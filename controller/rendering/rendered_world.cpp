@@ -85,6 +85,7 @@ class WorldOfDimension final : public RenderedWorld {
     // After a hold the scene continues from the time at which it stopped.
     if (started_) start.time_s = proxy_.time_s();
     proxy_.start(start);
+    limited_.start();
     if (started_) {
       anchor_.start_again(start.q);
     } else {
@@ -100,12 +101,17 @@ class WorldOfDimension final : public RenderedWorld {
     // One evaluation of 𝒢 moves the proxy to the nearest place that the scene allows, for any κ. If the proxy is
     // outside all objects, this place is nearer to the wanted place. If the proxy is inside an object, because limits
     // made the contact give way, 𝒢 moves the proxy out of the object, over any distance. So if 𝒢 leads away from the
-    // wanted place, the wanted place is used instead.
+    // wanted place, the wanted place is used instead, and contacts count from 𝒢's place.
     const Vec<N> wanted = space_.from_W(q_W), v = space_.basis().transpose() * v_W;
     if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
     ProxyStart<N> start;
-    start.q = scene_->algorithm<N>()(proxy_.kappa_N_per_m(), wanted, proxy_.q());
-    if (!((start.q - wanted).norm() <= (proxy_.q() - wanted).norm() + rounding_m)) start.q = wanted;
+    start.q = scene_->algorithm<N>()(proxy_.kappa_N_per_m(), wanted, limited_.from(proxy_.q()));
+    if ((start.q - wanted).norm() <= (proxy_.q() - wanted).norm() + rounding_m) {
+      limited_.start();
+    } else {
+      limited_.give_way_at(start.q);
+      start.q = wanted;
+    }
     start.v = v;
     start.time_s = proxy_.time_s();
     proxy_.start(start);
@@ -135,7 +141,7 @@ class WorldOfDimension final : public RenderedWorld {
   Vec3 look_ahead(const Vec3& h_W, const StepLimits& limits, double horizon_s) noexcept override {
     if (!ahead_) return last_.q_W;
     const Vec<N> h = space_.basis().transpose() * h_W;
-    return space_.to_W((*ahead_)(proxy_, changes_, h, limits, space_.basis(), horizon_s));
+    return space_.to_W((*ahead_)(proxy_, limited_, changes_, h, limits, space_.basis(), horizon_s));
   }
 
   void set(const Change& change) noexcept override {
@@ -173,7 +179,8 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   void archive(fieldbus::StateArchive& state) noexcept override {
-    state(proxy_, space_, changes_, anchor_, last_.q_W, damping_Ns_per_m_, added_Ns_per_m_, started_, unsettled_);
+    state(proxy_, limited_, space_, changes_, anchor_, last_.q_W, damping_Ns_per_m_, added_Ns_per_m_, started_,
+          unsettled_);
   }
 
  private:

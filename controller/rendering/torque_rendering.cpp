@@ -65,6 +65,7 @@ class TorquesOfDimension final : public TorqueRendering {
     missing_Nm_ = missing_Nm;
     space_.start(p_k1_W_);
     proxy_.start(space_.start());
+    limited_.start();
   }
 
   const TorqueStep& step(const JointVector& link_rad, double max_tool_speed_m_per_s) noexcept override {
@@ -98,7 +99,7 @@ class TorquesOfDimension final : public TorqueRendering {
   }
 
   void archive(fieldbus::StateArchive& state) noexcept override {
-    state(space_, proxy_, coupling_, missing_Nm_, p_k1_W_);
+    state(space_, proxy_, limited_, coupling_, missing_Nm_, p_k1_W_);
   }
 
  private:

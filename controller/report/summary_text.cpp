@@ -170,7 +170,7 @@ std::string touched(const Summary& s) {
     return std::to_string(s.contacts) + (s.contacts == 1 ? " touch, " : " touches, ") +
            format("%.2f s, ", s.contact_time_s) + format("%.2f s of it sliding", s.sliding_time_s);
   }
-  return s.proxy_clearance_min_m ? "none; the nearest surface was " + length(s.proxy_clearance_min_m) + " away"
+  return s.proxy_clearance_min_m ? "none; the nearest surface was at least " + length(s.proxy_clearance_min_m) + " away"
                                  : "none";
 }
 

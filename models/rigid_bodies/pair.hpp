@@ -47,11 +47,11 @@ constexpr bool is_point_and_face(PairKind kind) noexcept {
 // on the order of the enumerators.
 constexpr bool is_of_cylinder(PairKind kind) noexcept { return kind >= PairKind::side_point; }
 constexpr bool is_of_two_cylinders(PairKind kind) noexcept { return kind >= PairKind::sides; }
-// True for a rim over a flat surface.
 // The features may touch at several places; features of other pairs touch at one at most.
 constexpr bool has_several_places(PairKind kind) noexcept {
   return kind == PairKind::rim_field || is_of_cylinder(kind);
 }
+// True for a rim over a flat surface.
 constexpr bool is_flat_rim(PairKind kind) noexcept {
   return kind == PairKind::rim_field || kind == PairKind::rim_face || kind == PairKind::rim_end ||
          kind == PairKind::end_rim;

@@ -94,6 +94,11 @@ class Replay(ProgramTest):
         cell = whole.index(b"models/cells/default.yaml")
         log.write_bytes(whole[:cell] + b"../../../../../etc/passwd"[:25] + whole[cell + 25:])
         self.assert_refused(self.call("replay", record), "../../../../../etc/passwd", "a file of the record")
+        # A head without buses, of a cell that has three: by six axes, three buses, and their numbers.
+        head = b"\6\0\0\0\3\0\0\0\0\1\2"
+        self.assertEqual(whole.count(head), 1)
+        log.write_bytes(whole.replace(head, b"\6\0\0\0\0\0\0\0\0\0\0"))
+        self.assert_refused(self.call("replay", record), "buses", "found 3, expected 0, as recorded")
         # Cut off in the middle of an entry, as by a crash: all that is whole counts.
         log.write_bytes(whole[:-1000])
         self.assert_same(record)

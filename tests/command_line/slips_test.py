@@ -162,7 +162,7 @@ class WhatIsPrinted(ProgramTest):
 
     def test_a_scene_that_was_not_touched_is_told(self):
         room = SOURCE / "scenes/room.yaml"
-        self.assertRegex(self.lines_of("--scene", room)["contact"], r"^none; the nearest surface was [\d.]+ mm away$")
+        self.assertRegex(self.lines_of("--scene", room)["contact"], r"^none; the nearest surface was at least [\d.]+ mm away$")
         self.assertEqual(self.lines_of("--scene", SOURCE / "scenes/free.yaml")["contact"], "none")
 
     def test_every_clock_of_a_script_is_told(self):

@@ -20,7 +20,7 @@ CommandApp::CommandApp(const std::string& version)
   app_.require_subcommand(1);
   app_.set_version_flag("--version", "proxarm " + version);
   app_.formatter(std::make_shared<HelpFormatter>());
-  app_.set_help_all_flag("--help-all", "help of all commands");
+  app_.set_help_all_flag("--help-all", "help of all commands of this program");
 }
 
 CLI::App* CommandApp::add(const std::string& name, const std::string& text, std::function<int()> command) {

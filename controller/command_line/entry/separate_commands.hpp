@@ -19,8 +19,8 @@ const std::vector<SeparateCommand>& separate_commands();
 // Returns the help's line of the separate command `name`, which must exist.
 const std::string& text_of(const std::string& name);
 
-// Replaces this process by the separate program that carries out words[1], or returns if that is none. Throws
-// SetupError if the program isn't there.
+// Replaces this process by the separate program that carries out words[1], and doesn't return. Returns if words[1] is
+// no such command. Throws SetupError if the program isn't there.
 void become_separate(std::vector<char*> words);
 
 }  // namespace proxarm::command_line

@@ -98,9 +98,11 @@ void SessionOutput::introduce() const {
   if (options_.json) return;  // with --json only the summary goes to standard output
   const models::ToolSpace reach = models::tool_space(arm);
   const models::TipMass tip = arm.effective_mass_range(arm.start_rad(), reach.dimensions);
-  std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
+  std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms", session_.cell.name.c_str(),
               session_.scene.name.c_str(), controller::rendered_text(session_).c_str(),
               1e3 * session_.settings.period_s, 1e3 * controller::total_delay_s(session_));
+  if (session_.settings.looks_ahead) std::printf(", lookahead %.3g ms", 1e3 * session_.settings.horizon_s);
+  std::printf("\n");
   std::printf("the arm itself, without control: %.3g to %.3g kg at the tip", tip.min_kg, tip.max_kg);
   if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
   std::printf("\n");

@@ -1,8 +1,8 @@
 // Starts the process that shows the session, the view's process, and tells it what to show and how the session ended.
 //
-// The view's process runs another program (command_line/view/live_view.hpp), so the session has none of the view's code
-// in memory. Of the session's memory, the view's process has only the black box, and only reads it. If the view
-// crashes, the session goes on unchanged.
+// The view's process runs another program (controller/extras/view/program/live_view.hpp), so the session has none of
+// the view's code in memory. Of the session's memory, the view's process has only the black box, and only reads it. If
+// the view crashes, the session goes on unchanged.
 #pragma once
 
 #include <cstdint>

@@ -213,7 +213,7 @@ class Commands {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // As in other separate programs the first word is the command's name, where CLI11 expects the program's.
+  // proxarm gives the command's name as the first word, where CLI11 expects the program's.
   std::string program = "proxarm";
   std::vector<char*> words{program.data()};
   words.insert(words.end(), argv, argv + argc);
