@@ -324,7 +324,7 @@ TEST_F(CheckedSensor, TellsBadChecksumsAsLosses) {
   sensor.start(network, 0);
   EXPECT_EQ(sensor.describe_losses(), "") << "one was bad before the start was over";
   CanFrame unused;
-  for (const std::uint8_t number : {7, 8}) {
+  for (const std::uint8_t number : {std::uint8_t{7}, std::uint8_t{8}}) {
     wire.put(checked(number, 0), network.now_ns());
     (void)sensor.poll(network.now_ns(), unused);
     EXPECT_FALSE(sensor.fresh());
