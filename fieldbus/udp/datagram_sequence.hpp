@@ -28,7 +28,7 @@ class DatagramSequence {
 
   // Returns whether the datagram has the right length and is newer than all before it. A number that is less than half
   // of the counter's range ahead is newer. A sensor that was restarted counts from any number, so a second datagram in
-  // a row that isn't newer begins a new sequence, if it is newer than the first one of them.
+  // a row that isn't newer begins a new sequence, if it is newer than the refused one before it.
   bool accept(std::span<const std::uint8_t> datagram) noexcept;
   // Forgets the last number: the next datagram of the right length is accepted.
   void restart() noexcept { begun_ = false; }
@@ -43,7 +43,7 @@ class DatagramSequence {
 
   std::size_t bytes_;
   std::optional<description::NumberField> counter_;
-  std::uint32_t last_ = 0, refused_ = 0;  // refused_: that of the datagram before, if went_back_
+  std::uint32_t last_ = 0, refused_ = 0;  // refused_: of the datagram before, if went_back_
   bool begun_ = false, went_back_ = false;
   DatagramCounts counts_;
 };

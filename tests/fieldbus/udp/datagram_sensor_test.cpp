@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstring>
 #include <deque>
 #include <thread>
 
@@ -447,6 +448,53 @@ TEST_F(Loopback, GoesOnAfterNobodyListened) {
     EXPECT_TRUE(own->send(start)) << i;
     EXPECT_FALSE(own->receive(read, 0));
   }
+}
+
+// RFC 792: type 3, code, checksum, 4 unused bytes, then IP header and UDP ports of the datagram that was refused.
+Bytes destination_unreachable(std::uint8_t code, const sockaddr_in& from, const sockaddr_in& to) {
+  Bytes bytes(36);
+  bytes[0] = 3;
+  bytes[1] = code;
+  bytes[8] = 0x45;  // IPv4, a header of 5 words
+  bytes[11] = 28;   // total length
+  bytes[16] = 64;   // time to live
+  bytes[17] = 17;   // UDP
+  bytes[33] = 8;    // UDP length
+  std::memcpy(&bytes[20], &from.sin_addr, 4);
+  std::memcpy(&bytes[24], &to.sin_addr, 4);
+  std::memcpy(&bytes[28], &from.sin_port, 2);
+  std::memcpy(&bytes[30], &to.sin_port, 2);
+  std::uint32_t sum = 0;
+  for (std::size_t i = 0; i < bytes.size(); i += 2) sum += static_cast<std::uint32_t>(bytes[i] << 8 | bytes[i + 1]);
+  sum = ~((sum & 0xFFFF) + (sum >> 16));
+  bytes[2] = static_cast<std::uint8_t>(sum >> 8);
+  bytes[3] = static_cast<std::uint8_t>(sum);
+  return bytes;
+}
+
+TEST_F(Loopback, ReadsWhatWaitsBehindAnyIcmpError) {
+  const int raw = ::socket(AF_INET, SOCK_RAW | SOCK_CLOEXEC, IPPROTO_ICMP);
+  if (raw < 0) GTEST_SKIP() << "only root may send ICMP messages";
+  const auto own = open_udp({"127.0.0.1", port});
+  ASSERT_TRUE(own->send(start));
+  ASSERT_EQ(take(), start);
+  sockaddr_in sensor{};
+  socklen_t size = sizeof sensor;
+  ASSERT_EQ(getsockname(socket_, reinterpret_cast<sockaddr*>(&sensor), &size), 0);
+  // Protocol, port, network and host unknown, host isolated, network prohibited, prohibited by a filter.
+  for (const int code : {2, 3, 6, 7, 8, 9, 13}) {
+    answer(datagram(1), socket_);
+    const Bytes message = destination_unreachable(static_cast<std::uint8_t>(code), peer, sensor);
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_addr = peer.sin_addr;
+    ASSERT_EQ(sendto(raw, message.data(), message.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to), 36);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    Datagram read;
+    EXPECT_TRUE(own->receive(read, 0)) << code;
+    EXPECT_FALSE(own->receive(read, 0)) << code;
+  }
+  close(raw);
 }
 
 TEST(UdpPeers, OnLoopbackAloneUnlessTheUserSaidSo) {
