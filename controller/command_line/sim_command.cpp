@@ -79,12 +79,12 @@ int sim_command(const controller::RunOptions& options) {
   config.faults = options.faults;
   config.enabling = options.enabling;
   config.helps_to_prove = options.for_proof;
+  std::unique_ptr<sim::UdpServer> sensor_server;  // before `process`, whose cell it must outlive
   sim::FarEndProcess process(session.cell, session.sensor, hand, network, interface_of_bus, config);
   std::vector<std::unique_ptr<sim::ModbusServer>> servers;
   for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {
     servers.push_back(std::make_unique<sim::ModbusServer>(line, process.cell().modbus_devices(line.name)));
   }
-  std::unique_ptr<sim::UdpServer> sensor_server;
   if (session.cell.sensor.on_udp()) {  // FarEndProcess has refused a sensor that isn't on UDP
     const int port = session.cell.sensor.port;
     sensor_server = std::make_unique<sim::UdpServer>(session.cell.sensor.host,

@@ -61,16 +61,30 @@ bool is_state(const Message& message, ssize_t bytes) {
 
 // ---- The connection: one datagram a cycle in each direction, for all joints
 
+// Owns the descriptor, so that it is closed even if a constructor throws after socket().
+class UdpSocket {
+ public:
+  UdpSocket() : fd_(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {}
+  UdpSocket(const UdpSocket&) = delete;
+  UdpSocket& operator=(const UdpSocket&) = delete;
+  ~UdpSocket() {
+    if (fd_ >= 0) close(fd_);
+  }
+  [[nodiscard]] int fd() const noexcept { return fd_; }
+
+ private:
+  int fd_;
+};
+
 class ArmLink {
  public:
   ArmLink(int port, double period_s) : period_s_(period_s) {
-    socket_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(static_cast<std::uint16_t>(port));
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     // Once the socket is connected, the kernel drops datagrams of other senders.
-    if (socket_ < 0 || connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    if (socket_.fd() < 0 || connect(socket_.fd(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
       throw proxarm::SetupError({.message = "no UDP socket"});
     }
     for (int attempt = 0; attempt < 100 && !answer_; ++attempt) {
@@ -83,7 +97,6 @@ class ArmLink {
   ArmLink& operator=(const ArmLink&) = delete;
   ~ArmLink() {
     if (answer_) send(Wish::off, answer_->q_rad);
-    close(socket_);
   }
 
   // Once a cycle, from the first joint's drive: sends what all joints were set to in the last one, and takes the
@@ -130,7 +143,7 @@ class ArmLink {
     const Message message{setpoint_word, ++number_, static_cast<std::uint32_t>(wish),
                           static_cast<std::uint32_t>(std::lround(1e6 * period_s_)), q_rad};
     for (int attempt = 0; attempt < 2; ++attempt) {  // a refusal of the last one is told by the next call
-      if (::send(socket_, &message, sizeof message, MSG_NOSIGNAL) >= 0) return;
+      if (::send(socket_.fd(), &message, sizeof message, MSG_NOSIGNAL) >= 0) return;
     }
   }
 
@@ -139,7 +152,7 @@ class ArmLink {
     const Clock::time_point until = Clock::now() + patience;
     do {
       Message message;
-      for (ssize_t bytes = 0; (bytes = recv(socket_, &message, sizeof message, MSG_TRUNC)) >= 0;) {
+      for (ssize_t bytes = 0; (bytes = recv(socket_.fd(), &message, sizeof message, MSG_TRUNC)) >= 0;) {
         if (!is_state(message, bytes) || message.number != number_) continue;
         answer_ = message;
         answer_is_new_ = true;
@@ -149,7 +162,7 @@ class ArmLink {
     } while (Clock::now() < until);
   }
 
-  int socket_ = -1;
+  UdpSocket socket_;
   double period_s_;
   std::uint32_t number_ = 0, missed_ = 0, exchanges_ = 0;
   Wish wish_ = Wish::off;
@@ -250,16 +263,28 @@ class UdpDrive final : public fieldbus::CyclicDrive {
   double actual_rad_ = 0.0;
 };
 
+// Returns the number that is the whole word, from `lowest` to `highest`.
+double number_of(const char* word, const char* name, double lowest, double highest) {
+  char* end = nullptr;
+  const double number = std::strtod(word, &end);
+  if (end != word && *end == '\0' && number >= lowest && number <= highest) return number;
+  char expected[60];
+  std::snprintf(expected, sizeof expected, "a number from %g to %g", lowest, highest);
+  throw proxarm::SetupError({.key = name, .found = word, .expected = expected});
+}
+
 int main(int count, char** words) try {
   if (count < 2) {
     std::fprintf(stderr, "udp_arm PORT [RATE_HZ [SECONDS]]: the port of the arm's controller on 127.0.0.1\n");
     return 2;
   }
-  const double rate_Hz = count > 2 ? std::atof(words[2]) : 250.0, seconds = count > 3 ? std::atof(words[3]) : 6.0;
+  const int port = static_cast<int>(number_of(words[1], "PORT", 1, 65'535));
+  const double rate_Hz = count > 2 ? number_of(words[2], "RATE_HZ", 100, 1000) : 250.0;
+  const double seconds = count > 3 ? number_of(words[3], "SECONDS", 0.1, 3600) : 6.0;
   // Heavier than the default cell's 4 kg: a cycle and the network are between setpoint and joint.
   proxarm::Session session({{"timestep", 1.0 / rate_Hz}, {"mass", 20.0}, {"damping", 20.0}, {"duration", seconds}});
   const proxarm::description::Cell& cell = session.prepared().cell;
-  ArmLink link(std::atoi(words[1]), 1.0 / rate_Hz);
+  ArmLink link(port, 1.0 / rate_Hz);
   for (std::size_t i = 0; i < cell.drives.size(); ++i) {
     session.set_drive(cell.drives[i].joint, [&, start_rad = cell.start_rad[i]](
                                                 proxarm::controller::FarEnd& far_end, std::size_t axis,

@@ -40,6 +40,11 @@ DatagramSensor::~DatagramSensor() {
 
 // ---- Start
 
+// Drops datagrams from before. Without the bound, a sender faster than this loop would keep the session from starting.
+void DatagramSensor::empty_port(std::int64_t now_ns) noexcept {
+  for (int count = 0; count < flood && port_->receive(read_, now_ns);) ++count;
+}
+
 bool DatagramSensor::await_sample(CanNetwork& network) {
   const std::int64_t deadline_ns = network.now_ns() + settings_.answer_timeout_ns;
   CanFrame unused;
@@ -57,7 +62,7 @@ void DatagramSensor::start(CanNetwork& network, std::size_t, const FrameHandler&
   for (int attempt = 0; attempt < settings_.attempts && !answered; ++attempt) {
     (void)port_->send(protocol_.stop->data);
     network.sleep_until(network.now_ns() + settings_.pause_ns);
-    while (port_->receive(read_, network.now_ns())) continue;  // datagrams from before
+    empty_port(network.now_ns());
     sequence_.restart();
     (void)port_->send(protocol_.start->data);
     answered = await_sample(network);
@@ -66,6 +71,7 @@ void DatagramSensor::start(CanNetwork& network, std::size_t, const FrameHandler&
   // Datagrams that come while other devices are brought up don't count as lost.
   sequence_.restart();
   sequence_.forget_counts();
+  bad_checksums_before_ = decoder_.counts().bad_checksums;
   if (decoder_.latest().healthy) return;
   throw SetupError({.bus = settings_.peer,
                     .message = "force sensor (" + name_ + "), status",
@@ -75,15 +81,16 @@ void DatagramSensor::start(CanNetwork& network, std::size_t, const FrameHandler&
 }
 
 void DatagramSensor::refuse_start() const {
-  const std::uint64_t wrong = sequence_.counts().wrong_lengths;
+  const std::string wrong = losses_text({{sequence_.counts().wrong_lengths, "datagrams of a wrong length"},
+                                         {decoder_.counts().bad_checksums, "datagrams with a bad checksum"}});
   throw SetupError(
       {.bus = settings_.peer,
        .message = "force sensor (" + name_ + ")",
-       .found = wrong > 0 ? std::to_string(wrong) + " datagrams of a wrong length" : "no answer",
+       .found = wrong.empty() ? "no answer" : wrong,
        .expected = "datagrams of " + std::to_string(protocol_.sample_bytes()) + " bytes",
-       .advice = wrong > 0 ? "is it the sensor of the cell's file?"
-                           : "is it powered, are sensor.host and sensor.port its own, does no firewall drop UDP, and "
-                             "does no other program read it?"});
+       .advice = wrong.empty() ? "is it powered, are sensor.host and sensor.port its own, does no firewall drop UDP, "
+                                 "and does no other program read it?"
+                               : "is it the sensor of the cell's file?"});
 }
 
 std::string DatagramSensor::identity() const { return decoder_.identity() + ", UDP " + settings_.peer; }
@@ -126,6 +133,7 @@ void DatagramSensor::archive_input(StateArchive& state) noexcept {
 std::string DatagramSensor::describe_losses() const {
   const DatagramCounts& counts = sequence_.counts();
   return losses_text({{counts.wrong_lengths, "datagrams of a wrong length"},
+                      {decoder_.counts().bad_checksums - bad_checksums_before_, "datagrams with a bad checksum"},
                       {counts.lost, "datagrams left out by their numbers"},
                       {counts.out_of_order, "datagrams out of order"},
                       {counts.repeated, "datagrams repeated"},

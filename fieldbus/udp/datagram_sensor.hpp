@@ -67,6 +67,7 @@ class DatagramSensor final : public ForceSensor {
   [[nodiscard]] const DatagramCounts& counts() const noexcept { return sequence_.counts(); }
 
  private:
+  void empty_port(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool await_sample(CanNetwork& network);
   [[noreturn]] void refuse_start() const;
   [[nodiscard]] bool take_newest(std::int64_t now_ns) noexcept;
@@ -82,6 +83,7 @@ class DatagramSensor final : public ForceSensor {
   bool took_ = false;      // newest_ came in this cycle
   bool restored_ = false;  // newest_ was read from an archive, for the next poll()
   std::uint64_t floods_ = 0;
+  std::uint64_t bad_checksums_before_ = 0;  // those until the end of start()
 };
 
 }  // namespace proxarm::fieldbus

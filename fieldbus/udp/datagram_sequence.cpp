@@ -28,12 +28,16 @@ bool DatagramSequence::accept(std::span<const std::uint8_t> datagram) noexcept {
   const std::uint32_t step = (number - last_) & mask;
   if (begun_ && step == 0) {
     ++counts_.repeated;
+    went_back_ = false;
     return false;
   }
   const bool back = begun_ && step > mask / 2;
-  if (back && !went_back_) {
-    ++counts_.out_of_order;
+  const std::uint32_t step_from_refused = (number - refused_) & mask;
+  const bool begins_anew = went_back_ && step_from_refused != 0 && step_from_refused <= mask / 2;
+  if (back && !begins_anew) {
+    ++(went_back_ && step_from_refused == 0 ? counts_.repeated : counts_.out_of_order);
     went_back_ = true;
+    refused_ = number;
     return false;
   }
   if (begun_ && !back) counts_.lost += step - 1;

@@ -13,7 +13,7 @@ namespace proxarm::fieldbus {
 // Datagrams since the start.
 struct DatagramCounts {
   std::uint64_t wrong_lengths = 0;
-  std::uint64_t repeated = 0;      // had the number of the one before
+  std::uint64_t repeated = 0;      // had the number of the one before, used or refused
   std::uint64_t out_of_order = 0;  // had a number before that of the one before
   std::uint64_t lost = 0;          // numbers that were skipped; includes those that came later out of order
 
@@ -28,7 +28,7 @@ class DatagramSequence {
 
   // Returns whether the datagram has the right length and is newer than all before it. A number that is less than half
   // of the counter's range ahead is newer. A sensor that was restarted counts from any number, so a second datagram in
-  // a row that isn't newer begins a new sequence, unless it repeats a number.
+  // a row that isn't newer begins a new sequence, if it is newer than the refused one before it.
   bool accept(std::span<const std::uint8_t> datagram) noexcept;
   // Forgets the last number: the next datagram of the right length is accepted.
   void restart() noexcept { begun_ = false; }
@@ -36,14 +36,14 @@ class DatagramSequence {
   [[nodiscard]] const DatagramCounts& counts() const noexcept { return counts_; }
   // Sets all counts to 0.
   void forget_counts() noexcept { counts_ = {}; }
-  void archive(StateArchive& state) noexcept { state(last_, begun_, went_back_, counts_); }
+  void archive(StateArchive& state) noexcept { state(last_, refused_, begun_, went_back_, counts_); }
 
  private:
   [[nodiscard]] std::uint32_t number_in(std::span<const std::uint8_t> datagram) const noexcept;
 
   std::size_t bytes_;
   std::optional<description::NumberField> counter_;
-  std::uint32_t last_ = 0;
+  std::uint32_t last_ = 0, refused_ = 0;  // refused_: of the datagram before, if went_back_
   bool begun_ = false, went_back_ = false;
   DatagramCounts counts_;
 };

@@ -66,18 +66,19 @@ class UdpPort final : public DatagramPort {
   }
 
   bool send(std::span<const std::uint8_t> bytes) noexcept override {
-    // An ICMP message about an earlier datagram ("nobody listens there") fails one call: it says nothing of this one.
+    // An ICMP message about an earlier datagram ("nobody listens there", "no route") fails one call, with one of many
+    // errors: it says nothing of this datagram.
     for (int attempt = 0; attempt < 2; ++attempt) {
       if (::send(socket_.fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(bytes.size())) {
         return true;
       }
-      if (errno != ECONNREFUSED && errno != EINTR) return false;
+      if (errno == EAGAIN || errno == EWOULDBLOCK) return false;
     }
     return false;
   }
 
   bool receive(Datagram& out, std::int64_t now_ns) noexcept override {
-    // The first call may fail by an ICMP message, or by an interrupt.
+    // A call may fail by an ICMP message of any kind, or by an interrupt, while datagrams wait.
     for (int attempt = 0; attempt < 3; ++attempt) {
       iovec part{.iov_base = out.data.data(), .iov_len = out.data.size()};
       alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof(timespec))> control;
@@ -92,7 +93,7 @@ class UdpPort final : public DatagramPort {
         out.time_ns = stamp(message, now_ns);
         return true;
       }
-      if (errno != ECONNREFUSED && errno != EINTR) return false;
+      if (errno == EAGAIN || errno == EWOULDBLOCK) return false;
     }
     return false;
   }

@@ -3,7 +3,8 @@
 //
 // A datagram's time stamp is set by the kernel at reception (SO_TIMESTAMPNS, CLOCK_REALTIME) and converted to
 // CLOCK_MONOTONIC, the clock of SocketCanNetwork. If CLOCK_REALTIME was set in between, the stamp is wrong by that
-// step, but never in the future.
+// step, but never in the future. The kernel begins to stamp at reception shortly after the first socket of the machine
+// asked for it, later on a busy machine; until then a datagram has the time at which it was read.
 #pragma once
 
 #include <memory>

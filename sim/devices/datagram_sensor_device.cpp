@@ -7,7 +7,7 @@ namespace proxarm::sim {
 
 void DatagramSensorDevice::obey(DescribedDevice& device, std::int64_t time_ns) noexcept {
   fieldbus::Datagram request;
-  while (wire_ != nullptr && wire_->take(request)) {
+  for (int count = 0; count < most_requests && wire_ != nullptr && wire_->take(request); ++count) {
     fieldbus::CanFrame frame;
     if (request.bytes > frame.data.size()) continue;
     frame.id = 1;

@@ -33,6 +33,10 @@ class DatagramSensorDevice final : public DevicePort {
     if (wire_ == &wire) wire_ = nullptr;
   }
 
+  // Requests that one call of obey() reads: a sender that floods the device must not hold up the physics. A session
+  // sends two at its start; the rest waits for the next call.
+  static constexpr int most_requests = 256;
+
   // Gives the requests that have come to the device. Must be called at least once a millisecond.
   void obey(DescribedDevice& device, std::int64_t time_ns) noexcept;
   void send(const fieldbus::CanFrame& sample, std::int64_t ready_ns) noexcept override;
@@ -54,7 +58,7 @@ class InProcessPort final : public fieldbus::DatagramPort, private DatagramWire 
   bool receive(fieldbus::Datagram& out, std::int64_t now_ns) noexcept override;
 
  private:
-  // A queue of the latest datagrams in the order of their arrival.
+  // A queue of datagrams in the order of their arrival. A full queue drops the newest, as the kernel's do.
   struct Queue {
     static constexpr std::size_t room = 128;
     std::array<fieldbus::Datagram, room> datagrams{};

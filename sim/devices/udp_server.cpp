@@ -49,7 +49,7 @@ void UdpServer::send(std::span<const std::uint8_t> bytes, std::int64_t) noexcept
 
 bool UdpServer::take(fieldbus::Datagram& request) noexcept {
   sockaddr_in peer{};
-  // A call can fail by an ICMP message about a sample that was sent before.
+  // A call can fail by an ICMP message of any kind about a sample that was sent before, while requests wait.
   for (int attempt = 0; attempt < 3; ++attempt) {
     socklen_t size = sizeof peer;
     const ssize_t bytes =
@@ -60,7 +60,7 @@ bool UdpServer::take(fieldbus::Datagram& request) noexcept {
       peer_port_ = peer.sin_port;
       return true;
     }
-    if (errno != ECONNREFUSED && errno != EINTR) return false;
+    if (errno == EAGAIN || errno == EWOULDBLOCK) return false;
   }
   return false;
 }

@@ -210,9 +210,18 @@ class TimingOfSessions(UdpTest):
                 self.assertEqual(faults[0][0], "sensor_saturated", faults)
 
     def test_a_flood_of_the_sensor_is_read_no_later_than_a_cycle(self):
-        """Whatever comes of it, the session ends in time, and well or by a fault of the sensor."""
-        faults = self.fault_of(lambda n: [rdt(400 * n + i) for i in range(400)], rate_Hz=300)
-        self.assertTrue(all(fault[0].startswith("sensor_") for fault in faults), faults)
+        """Up to 120,000 datagrams a second, in bursts of 400; the port holds some 170 of them, of which a cycle reads all.
+
+        The sender, the simulated arm and the session share the machine: sensor and drives may be late, but no cycle."""
+        outcome = self.session(Device(self.udp, lambda n: [rdt(400 * n + i) for i in range(400)], rate_Hz=300), duration="2s")
+        self.assertIn(outcome.status, (0, 1), outcome.err)
+        faults = {fault["fault"] for fault in outcome.summary["faults"]}
+        self.assertLessEqual(faults, {"sensor_lost", "modbus_silent"}, outcome.summary["faults"])
+        compute_us = outcome.summary["compute_us"]
+        # 170 datagrams take 0.2 ms of a processor. A sanitized build needs ten times as long, and still half a cycle.
+        self.assertLess(compute_us["median"], 2000)
+        # The cycle of 4 ms. The longest one contains what the scheduler took from it, so one may be longer.
+        self.assertLessEqual(outcome.summary["overruns"], 1, compute_us)
 
     def test_strangers_are_not_heard(self):
         """Datagrams of another port of the same address, with 300 N and a sequence far ahead."""

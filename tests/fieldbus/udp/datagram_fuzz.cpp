@@ -1,5 +1,6 @@
 // Datagrams from whoever has the sensor's address: read without harm, and a sample is finite and of a datagram of the
-// right length with a number that wasn't there before.
+// right length. If that datagram was its cycle's only one, its number isn't that of the sample before. The first signal
+// is read from the number's own bytes, so each sample shows its number.
 //
 // Input: pieces of one byte (length) and so many bytes; a length of FFh ends a cycle.
 #include <algorithm>
@@ -43,7 +44,7 @@ description::SensorDescription net_ft() {
   protocol.status = description::SensorStatus{.number = {.byte = 8, .bits = 32}, .bits_named = {}};
   for (std::size_t i = 0; i < 6; ++i) {
     description::SensorSignal signal;
-    signal.number = {.byte = 12 + 4 * i, .bits = 32, .kind = description::NumberKind::signed_integer};
+    signal.number = {.byte = i == 0 ? 0 : 12 + 4 * i, .bits = 32, .kind = description::NumberKind::signed_integer};
     signal.scale = 1e-6;
     signal.saturated_below = signal.number.lowest();
     signal.saturated_above = signal.number.highest();
@@ -61,6 +62,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fieldbus::DatagramSensor sensor(net_ft(), std::make_unique<FuzzedPort>(), {.peer = "fuzzed"});
   std::int64_t now_ns = 1'000'000'000;
   std::size_t right = 0;
+  bool flooded = false;
   for (std::size_t at = 0; at < size;) {
     const std::uint8_t length = data[at++];
     if (length != 0xFF) {
@@ -73,12 +75,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       waiting.push_back(datagram);
       continue;
     }
-    const std::uint64_t before = sensor.latest().number;
+    const fieldbus::ForceSample before = sensor.latest();
     fieldbus::CanFrame frame;
+    flooded = flooded || waiting.size() > std::size_t{fieldbus::DatagramSensor::flood};
     if (sensor.poll(now_ns, frame)) std::abort();
     now_ns += 1'000'000;
-    if (sensor.fresh() != (sensor.latest().number == before + 1)) std::abort();
+    if (sensor.fresh() != (sensor.latest().number == before.number + 1)) std::abort();
     if (sensor.fresh() && right == 0) std::abort();
+    // A flood's numbers are noted, but it makes no sample.
+    const bool same_number = before.number > 0 && sensor.latest().wrench_S[0] == before.wrench_S[0];
+    if (sensor.fresh() && right == 1 && same_number && !flooded) std::abort();
     right = 0;
     for (const double value : sensor.latest().wrench_S) {
       if (!std::isfinite(value) || std::abs(value) > 2147.5) std::abort();

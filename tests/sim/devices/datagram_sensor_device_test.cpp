@@ -81,6 +81,20 @@ TEST_F(SimulatedNetFt, DropsWhatNobodyTakes) {
   EXPECT_EQ(count, 128);
 }
 
+TEST_F(SimulatedNetFt, ReadsNoFloodToItsEnd) {
+  struct Flood final : DatagramWire {
+    int taken = 0;
+    void send(std::span<const std::uint8_t>, std::int64_t) noexcept override {}
+    bool take(fieldbus::Datagram& request) noexcept override {
+      request.bytes = 0;
+      return ++taken > 0;
+    }
+  } flood;
+  wire.connect(flood);
+  wire.obey(device, ready_ns);
+  EXPECT_EQ(flood.taken, DatagramSensorDevice::most_requests);
+}
+
 TEST_F(SimulatedNetFt, NeedsNoPortAtAll) {
   convert(ready_ns);
   { const InProcessPort port(wire); }
