@@ -105,7 +105,10 @@ class WorldOfDimension final : public RenderedWorld {
     const Vec<N> wanted = space_.from_W(q_W), v = space_.basis().transpose() * v_W;
     if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
     ProxyStart<N> start;
-    start.q = scene_->algorithm<N>()(proxy_.kappa_N_per_m(), wanted, limited_.from(proxy_.q()));
+    models::GeometricAlgorithm<N>& g = scene_->algorithm<N>();
+    // Objects have already moved in this cycle. They don't move once more: they would pass the proxy.
+    if (g.wants_time() && !g.has_media()) g.set_time({proxy_.time_s(), 0.0});
+    start.q = g(proxy_.kappa_N_per_m(), wanted, limited_.from(proxy_.q()));
     if ((start.q - wanted).norm() <= (proxy_.q() - wanted).norm() + rounding_m) {
       limited_.start();
     } else {

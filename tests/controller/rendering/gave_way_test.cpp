@@ -24,6 +24,7 @@ struct World {
       : scene(scenes::compile(scenes::parse_scene("objects:\n  - " + object, source_file("scenes/gave_way.yaml")))),
         world(make_rendered_world(scene, SessionSettings{}, 4.0)) {
     world->start(Vec3::Zero());
+    free();  // the first step settles the start
   }
   // A step that limits take to `way_m` from the last place, and nowhere else.
   WorldStep forced(const Vec3& way_m) {
@@ -66,10 +67,26 @@ TEST(GaveWay, AProxyThatLimitsPutIntoAnObjectComesOutWhereItWentIn) {
 TEST(GaveWay, AProxyThatTheArmTakesIntoAnObjectComesOutWhereItWentIn) {
   for (const std::string& object : {box, mesh}) {
     World world(object);
-    world.free();
     for (int k = 1; k <= 5; ++k) world.world->resume({1e-3 * k, 0.0, 0.0}, Vec3::Zero());
     for (int k = 0; k < 5; ++k) world.free();
     EXPECT_LT(world.q.x(), face_m + rounding_m) << object;
+  }
+}
+
+// A block that comes at 0.1 m/s, or goes; in each cycle the arm takes the proxy on into the block.
+TEST(GaveWay, AMovingMeshKeepsTheProxyOnItsSideWhereverTheArmTakesIt) {
+  constexpr double T = 1e-3;
+  for (const double speed_m_per_s : {-0.1, 0.1}) {
+    std::string moving = mesh;
+    moving.insert(moving.rfind('}'), ", motion: {velocity_m_per_s: [" + std::to_string(speed_m_per_s) + ", 0, 0]}");
+    World world(moving);
+    int steps = 1;
+    for (int k = 0; k < 200; ++k, ++steps) {
+      world.free({20.0, 0.0, 0.0});
+      world.q = world.world->resume(world.q + Vec3(3e-4, 2e-5, 0.0), Vec3(speed_m_per_s, 0.0, 0.0));
+    }
+    for (int k = 0; k < 3; ++k, ++steps) world.free();
+    EXPECT_LT(world.q.x(), face_m + speed_m_per_s * T * steps + rounding_m) << speed_m_per_s << " m/s";
   }
 }
 
