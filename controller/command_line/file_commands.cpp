@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <variant>
 #include <vector>
@@ -119,8 +120,8 @@ void require_simulable(const controller::PreparedSession& session) {
 }
 
 // Checks a cell together with the files that the cell names: builds each device as the controller would, and throws
-// SetupError for what `run` would refuse.
-void check_cell(const fs::path& file, const fs::path& scene) {
+// SetupError for what `run` would refuse. Returns a text for people: what the file is.
+std::string check_cell(const fs::path& file, const fs::path& scene) {
   const description::Cell cell = description::load_cell(file);
   if (!cell.default_scene.empty()) description::require_default_file(cell, "default_scene", cell.default_scene);
   if (!cell.default_hand.empty()) description::require_default_file(cell, "default_hand", cell.default_hand);
@@ -141,12 +142,14 @@ void check_cell(const fs::path& file, const fs::path& scene) {
   tell(controller::surprises(session));
   controller::require_runnable(session, run);
   require_simulable(session);
-  // In millimetres, without a negative zero.
-  const models::Vec3 start_W = (1e3 * arm.tool_pose(arm.start_rad()).translation()).array().round() / 1e3 + 0.0;
-  std::printf("the tool starts at [%g, %g, %g] m\n", start_W.x(), start_W.y(), start_W.z());
   std::vector<fieldbus::DriveSlot> slots;
   for (fieldbus::ServoDrive& servo : servos) slots.push_back({&servo, 0});
   tell(fieldbus::losses_of(slots));
+  // To a millimetre, without a negative zero.
+  const models::Vec3 start_W = (1e3 * arm.tool_pose(arm.start_rad()).translation()).array().round() / 1e3 + 0.0;
+  std::ostringstream text;
+  text << "cell; its tool starts at [" << start_W.x() << ", " << start_W.y() << ", " << start_W.z() << "] m";
+  return text.str();
 }
 
 void tell_sources(const fs::path& file) {
@@ -168,11 +171,10 @@ const char* tell_mesh(const fs::path& file) {
              : "mesh for a point tool; with a rigid tool it is refused, as an object and as the tool";
 }
 
-const char* check(const fs::path& file, const CheckFilesOptions& options) {
+std::optional<std::string> check(const fs::path& file, const CheckFilesOptions& options) {
   switch (controller::kind_of(file)) {
     case controller::FileKind::cell:
-      check_cell(file, options.scene);
-      return "cell";
+      return check_cell(file, options.scene);
     case controller::FileKind::registers:
       tell(controller::register_doubts(description::load_modbus_drive(file)));
       return "register map of a Modbus drive";
@@ -199,7 +201,8 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       return tell_mesh(file);
     case controller::FileKind::scene:
     case controller::FileKind::unknown:
-      return check_scene_file(scenes::load_scene(file), options.states);
+      if (const char* what = check_scene_file(scenes::load_scene(file), options.states)) return what;
+      return std::nullopt;
   }
   return "";
 }
@@ -210,13 +213,13 @@ int check_command(const CheckFilesOptions& options) {
   int status = 0;
   for (const fs::path& given : options.files) {
     try {
-      const char* kind = check(controller::user_file(given), options);
+      const std::optional<std::string> kind = check(controller::user_file(given), options);
       if (kind == kUntouched) {
         std::fprintf(stderr, "proxarm: %s: no verdict: no state touched anything; push deeper with --depth\n",
                      given.c_str());
         status = set_up_mistake;
-      } else if (kind != nullptr) {
-        std::printf("%s: fine, %s %s\n", given.c_str(), *kind == 'a' ? "an" : "a", kind);
+      } else if (kind) {
+        std::printf("%s: fine, %s %s\n", given.c_str(), kind->starts_with('a') ? "an" : "a", kind->c_str());
       } else {
         std::fprintf(stderr,
                      "proxarm: %s: it breaks a law; the state is given above, behind \"worst at\" or \"first at\"\n",

@@ -16,6 +16,8 @@ using Lines = std::vector<std::string>;
 
 // Number of the arm's reaches. An object that is further from the tool's start than this is never touched.
 constexpr double far_reaches = 4.0;
+// A hand may pull at an arm at the end of its reach from this far beyond, m.
+constexpr double pulls_from_m = 0.3;
 const Expected friction{0.0, 3.0, "", {{"percent", 1e-2}}};
 
 // Returns a lower bound of the distance to a shape's surface; absent for a mesh, since meshes have their own report.
@@ -187,7 +189,7 @@ std::vector<std::string> hand_doubts(const description::HandDescription& hand, c
     }
     if (!reach || !reach->first_axis) continue;
     const double beyond_m = reach->first_axis->beyond_m(reach->start_W + Vec3(waypoint.offset_m.data()));
-    if (beyond_m > 0.0) {
+    if (beyond_m > pulls_from_m) {
       lines.push_back("waypoints.offset_m: the one at " + description::rounded_text(waypoint.time_s) + " s is " +
                       beyond_text(beyond_m, *reach->first_axis));
     }

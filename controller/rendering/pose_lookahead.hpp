@@ -9,7 +9,8 @@
 // One step of 𝒢 instead of one for each period, since a step costs microseconds. At a flat face both give the same
 // place: the tool loses the speed v_n across the face, and μ v_n along it. A tool that would stick at the face is sent
 // less far along the face: its way before the impact is missing. At p(k) the tool with orientation R is outside all
-// objects, so the arm is never sent into one.
+// objects. The commanded point brakes within the limits of acceleration (limits/sent_point.hpp), so after an impact at
+// 0.4 m/s the arm goes on into the object by one or two millimetres.
 //
 // 𝒢 is a clone, since 𝒢 has memory. Where objects move, the clone takes the state of the original before each
 // prediction; scripted objects go on for H, driven objects stay.

@@ -231,7 +231,7 @@ class Mistakes(unittest.TestCase):
         for cell in cells:
             status, said = answer("check", cell)
             self.assertEqual(status, 0, said)
-            self.assertRegex(said, rf"^the tool starts at \[[^]]*\] m\n{re.escape(cell)}: fine, a cell\n$")
+            self.assertRegex(said, rf"^{re.escape(cell)}: fine, a cell; its tool starts at \[[^]]*\] m\n$")
         for folder in ("scenes", "sim/hands"):
             for name in sorted(os.listdir(os.path.join(ROOT, folder))):
                 if not name.endswith(".yaml"):

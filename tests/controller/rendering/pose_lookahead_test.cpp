@@ -52,7 +52,8 @@ struct World {
 
 // A hand that pushes this way and that, another way each 40 ms.
 Vec3 force(int k) {
-  const double phase = 0.7 * (k / 40);
+  const int turn = k / 40;
+  const double phase = 0.7 * turn;
   return {12.0 * std::sin(phase) + 6.0, 9.0 * std::cos(1.3 * phase), 4.0 * std::sin(2.1 * phase)};
 }
 

@@ -344,12 +344,12 @@ TEST(DatagramSensorFile, IsRefusedWithoutDatagrams) {
 
 struct Loopback : ::testing::Test {
   Loopback() {
-    socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    bind_to(socket_, port);
+    descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    bind_to(descriptor, port);
     const timeval patience{.tv_sec = 5, .tv_usec = 0};
-    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    setsockopt(descriptor, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   }
-  ~Loopback() override { close(socket_); }
+  ~Loopback() override { close(descriptor); }
 
   static void bind_to(int socket, int& port) {
     sockaddr_in address{};
@@ -364,7 +364,8 @@ struct Loopback : ::testing::Test {
   [[nodiscard]] Bytes take() {
     Bytes bytes(100);
     socklen_t size = sizeof peer;
-    const ssize_t count = recvfrom(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &size);
+    const ssize_t count =
+        recvfrom(descriptor, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&peer), &size);
     bytes.resize(static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
     return bytes;
   }
@@ -380,7 +381,7 @@ struct Loopback : ::testing::Test {
     return false;
   }
 
-  int socket_ = -1, port = 0;
+  int descriptor = -1, port = 0;
   sockaddr_in peer{};
 };
 
@@ -390,7 +391,7 @@ TEST_F(Loopback, CarriesDatagramsBothWaysWithTheTimeOfArrival) {
   const auto age_of = [&](std::uint32_t number) {
     EXPECT_TRUE(own->send(start));
     EXPECT_EQ(take(), start);
-    answer(datagram(number), socket_);
+    answer(datagram(number), descriptor);
     Datagram read;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     EXPECT_TRUE(await(*own, read));
@@ -419,7 +420,7 @@ TEST_F(Loopback, HearsNoStranger) {
   int strangers_port = 0;
   bind_to(stranger, strangers_port);
   answer(datagram(7), stranger);
-  answer(datagram(1), socket_);
+  answer(datagram(1), descriptor);
   Datagram read;
   ASSERT_TRUE(await(*own, read));
   EXPECT_EQ(read.data[3], 1) << "the stranger's came first";
@@ -431,7 +432,7 @@ TEST_F(Loopback, ShowsADatagramThatIsTooLong) {
   const auto own = open_udp({"127.0.0.1", port});
   ASSERT_TRUE(own->send(start));
   ASSERT_EQ(take(), start);
-  answer(Bytes(60'000), socket_);
+  answer(Bytes(60'000), descriptor);
   Datagram read;
   ASSERT_TRUE(await(*own, read));
   EXPECT_EQ(read.bytes, Datagram::most_bytes);
@@ -480,10 +481,10 @@ TEST_F(Loopback, ReadsWhatWaitsBehindAnyIcmpError) {
   ASSERT_EQ(take(), start);
   sockaddr_in sensor{};
   socklen_t size = sizeof sensor;
-  ASSERT_EQ(getsockname(socket_, reinterpret_cast<sockaddr*>(&sensor), &size), 0);
+  ASSERT_EQ(getsockname(descriptor, reinterpret_cast<sockaddr*>(&sensor), &size), 0);
   // Protocol, port, network and host unknown, host isolated, network prohibited, prohibited by a filter.
   for (const int code : {2, 3, 6, 7, 8, 9, 13}) {
-    answer(datagram(1), socket_);
+    answer(datagram(1), descriptor);
     const Bytes message = destination_unreachable(static_cast<std::uint8_t>(code), peer, sensor);
     sockaddr_in to{};
     to.sin_family = AF_INET;
