@@ -107,7 +107,7 @@ class WorldOfDimension final : public RenderedWorld {
     ProxyStart<N> start;
     models::GeometricAlgorithm<N>& g = scene_->algorithm<N>();
     // Objects have already moved in this cycle. They don't move once more: they would pass the proxy.
-    if (g.wants_time() && !g.has_media()) g.set_time({proxy_.time_s(), 0.0});
+    if (g.wants_time()) g.set_time({proxy_.time_s(), 0.0});
     start.q = g(proxy_.kappa_N_per_m(), wanted, limited_.from(proxy_.q()));
     if ((start.q - wanted).norm() <= (proxy_.q() - wanted).norm() + rounding_m) {
       limited_.start();
