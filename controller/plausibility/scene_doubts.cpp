@@ -20,38 +20,6 @@ constexpr double far_reaches = 4.0;
 constexpr double pulls_from_m = 0.3;
 const Expected friction{0.0, 3.0, "", {{"percent", 1e-2}}};
 
-// Returns a lower bound of the distance to a shape's surface; absent for a mesh, since meshes have their own report.
-std::optional<double> distance_m(const scenes::Shape& shape, const Vec3& from_W) {
-  if (const auto* plane = std::get_if<scenes::PlaneShape>(&shape)) {
-    return std::abs(plane->normal.normalized().dot(from_W - plane->point_m));
-  }
-  if (const auto* box = std::get_if<scenes::BoxShape>(&shape)) {
-    return std::max(0.0, (box->pose_W.translation() - from_W).norm() - 0.5 * box->size_m.norm());
-  }
-  if (const auto* sphere = std::get_if<scenes::SphereShape>(&shape)) {
-    return std::abs((sphere->centre_m - from_W).norm() - sphere->radius_m);
-  }
-  const auto along = [&](const Vec3& from_m, const Vec3& to_m, double radius_m) {
-    const double half_m = 0.5 * (to_m - from_m).norm();
-    return std::max(0.0, (0.5 * (from_m + to_m) - from_W).norm() - half_m - radius_m);
-  };
-  if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&shape)) {
-    return along(capsule->from_m, capsule->to_m, capsule->radius_m);
-  }
-  if (const auto* cylinder = std::get_if<scenes::CylinderShape>(&shape)) {
-    return along(cylinder->from_m, cylinder->to_m, cylinder->radius_m);
-  }
-  return std::nullopt;
-}
-
-// Returns the radius of a round shape, m; 0 for other shapes.
-double radius_of(const scenes::Shape& shape) {
-  if (const auto* sphere = std::get_if<scenes::SphereShape>(&shape)) return sphere->radius_m;
-  if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&shape)) return capsule->radius_m;
-  if (const auto* cylinder = std::get_if<scenes::CylinderShape>(&shape)) return cylinder->radius_m;
-  return 0.0;
-}
-
 // A ball around a box, sphere, capsule or cylinder.
 struct Ball {
   Vec3 centre_W;
@@ -68,6 +36,26 @@ std::optional<Ball> ball_around(const scenes::Shape& shape) {
   if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&shape)) return along(*capsule);
   if (const auto* cylinder = std::get_if<scenes::CylinderShape>(&shape)) return along(*cylinder);
   return std::nullopt;
+}
+
+// Returns a lower bound of the distance to a shape's surface; absent for a mesh, since meshes have their own report.
+std::optional<double> distance_m(const scenes::Shape& shape, const Vec3& from_W) {
+  if (const auto* plane = std::get_if<scenes::PlaneShape>(&shape)) {
+    return std::abs(plane->normal.normalized().dot(from_W - plane->point_m));
+  }
+  const std::optional<Ball> ball = ball_around(shape);
+  if (!ball) return std::nullopt;
+  const double outside_m = (ball->centre_W - from_W).norm() - ball->radius_m;
+  // Within a sphere its surface is that far away, too.
+  return std::holds_alternative<scenes::SphereShape>(shape) ? std::abs(outside_m) : std::max(0.0, outside_m);
+}
+
+// Returns the radius of a round shape, m; 0 for other shapes.
+double radius_of(const scenes::Shape& shape) {
+  if (const auto* sphere = std::get_if<scenes::SphereShape>(&shape)) return sphere->radius_m;
+  if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&shape)) return capsule->radius_m;
+  if (const auto* cylinder = std::get_if<scenes::CylinderShape>(&shape)) return cylinder->radius_m;
+  return 0.0;
 }
 
 std::string beyond_text(double beyond_m, const ToolReach::FirstAxis& axis) {

@@ -22,33 +22,31 @@ const SeparateCommand* find(const std::string& name) {
 const std::vector<SeparateCommand>& separate_commands() {
   static const std::string commissioning = "proxarm-commissioning";
   static const std::vector<SeparateCommand> commands{
-      {"schema", "what cell, hand, scene, sensor or drive files may say, as JSON Schema for editors", commissioning,
-       "./dev schema"},
-      {"tune", "advice on mass, inertia, damping and timestep for a cell and a hand", commissioning, "./dev tune"},
+      {"schema", "what cell, hand, scene, sensor or drive files may say, as JSON Schema for editors", commissioning},
+      {"tune", "advice on mass, inertia, damping and timestep for a cell and a hand", commissioning},
       {"prove",
        "whether an arm is as its cell says, by small slow motions and pushes: joint signs, gear ratios, the sensor's "
        "mounting, sign and scale, brakes. Status 1: not proven",
-       commissioning, "./dev prove"},
+       commissioning},
       {"zero",
        "what the sensor reads with nobody at the handle: tared, and kept beside the cell for the sessions to come, "
        "whose tare is held against it. Nothing moves. Status 1: somebody was there",
-       commissioning, "./dev zero"},
+       commissioning},
       {"identify",
        "mass, centre of mass and zero of what hangs behind the sensor, by slow motions of the wrist, or friction, "
        "rotors and gears of the joints (--joints), with their uncertainty. Status 1: not identified",
-       commissioning, "./dev identify"},
+       commissioning},
       {"calibrate",
        "where the encoders' zeros are: by poses that the arm is brought to by hand, or by homing; into the cell's "
        "file, with a backup. Status 1: the poses don't fit one another",
-       commissioning, "./dev calibrate"},
+       commissioning},
       {"assess",
        "stopping times and distances, and clamping forces, of the simulated arm, held against thresholds; certifies "
        "nothing. Status 1: a threshold is exceeded",
-       commissioning, "./dev assess"},
-      {"new-cell", "a cell of your own arm out of its URDF or xacro: runs at once in simulation", "proxarm-new-cell",
-       "./dev new-cell"},
-      {"study", "accuracy, stability and speed measured: CSV, JSON and plots", "proxarm-study", "./dev study"},
-      {"view", "a recorded session or a black box in the browser", "proxarm-view", "./dev view"}};
+       commissioning},
+      {"new-cell", "a cell of your own arm out of its URDF or xacro: runs at once in simulation", "proxarm-new-cell"},
+      {"study", "accuracy, stability and speed measured: CSV, JSON and plots", "proxarm-study"},
+      {"view", "a recorded session or a black box in the browser", "proxarm-view"}};
   return commands;
 }
 
@@ -62,7 +60,7 @@ void become_separate(std::vector<char*> words) {
   execv(program.c_str(), words.data() + 1);
   throw description::SetupError({.found = "no program " + program + ", which carries out " + command->name,
                                  .expected = "it beside proxarm",
-                                 .advice = "in a source tree `" + command->builder + "` builds it"});
+                                 .advice = "in a source tree `./dev " + command->name + "` builds it"});
 }
 
 }  // namespace proxarm::command_line

@@ -9,8 +9,7 @@ namespace proxarm::command_line {
 struct SeparateCommand {
   std::string name;     // as in `proxarm NAME`
   std::string text;     // its line in the help
-  std::string program;  // file name
-  std::string builder;  // builds the program in a source tree
+  std::string program;  // file name; in a source tree `./dev NAME` builds it
 };
 
 // In the order of the help.

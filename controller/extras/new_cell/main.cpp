@@ -6,6 +6,7 @@
 
 #include "controller/command_line/entry/help.hpp"
 #include "controller/command_line/entry/program.hpp"
+#include "controller/command_line/entry/separate_commands.hpp"
 #include "controller/extras/new_cell/new_cell.hpp"
 #include "controller/options/parsing/option_parsing.hpp"
 
@@ -40,7 +41,7 @@ void add_options(CLI::App& app, NewCellOptions& options) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"a cell of your own arm out of its URDF or xacro: runs at once in simulation", "proxarm new-cell"};
+  CLI::App app{command_line::text_of("new-cell"), "proxarm new-cell"};
   app.formatter(std::make_shared<command_line::HelpFormatter>());
   NewCellOptions options;
   add_options(app, options);

@@ -9,6 +9,7 @@
 
 #include "controller/command_line/entry/help.hpp"
 #include "controller/command_line/entry/program.hpp"
+#include "controller/command_line/entry/separate_commands.hpp"
 #include "controller/extras/studies/program/study_command.hpp"
 #include "controller/options/parsing/option_parsing.hpp"
 
@@ -43,7 +44,7 @@ void add_study_options(CLI::App& app, StudyOptions& options) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"accuracy, stability and speed measured: CSV, JSON and plots", "proxarm study"};
+  CLI::App app{command_line::text_of("study"), "proxarm study"};
   app.formatter(std::make_shared<command_line::HelpFormatter>());
   StudyOptions options;
   options.command_line = "proxarm study";
