@@ -10,6 +10,7 @@
 #include "controller/preparation/start_check.hpp"
 #include "fieldbus/can/socket_can_network.hpp"
 #include "fieldbus/canopen/bus_leader.hpp"
+#include "fieldbus/udp/udp_port.hpp"
 #include "models/base/setup_error.hpp"
 #include "sim/cell/far_end_process.hpp"
 #include "sim/devices/modbus_server.hpp"
@@ -86,9 +87,8 @@ int sim_command(const controller::RunOptions& options) {
     servers.push_back(std::make_unique<sim::ModbusServer>(line, process.cell().modbus_devices(line.name)));
   }
   if (session.cell.sensor.on_udp()) {  // FarEndProcess has refused a sensor that isn't on UDP
-    const int port = session.cell.sensor.port;
-    sensor_server = std::make_unique<sim::UdpServer>(session.cell.sensor.host,
-                                                     port != 0 ? port : session.sensor.described->datagrams->port);
+    const fieldbus::UdpPeer own = fieldbus::peer_of(session.cell.sensor, session.sensor);
+    sensor_server = std::make_unique<sim::UdpServer>(own.host, own.port);
     process.cell().connect_sensor(*sensor_server);
   }
   if (view) view->watch(process.cell());

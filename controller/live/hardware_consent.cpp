@@ -122,7 +122,7 @@ std::vector<fieldbus::UdpPeer> real_udp_peers(const PreparedSession& session,
                                               const HardwareSurroundings& surroundings) {
   const description::SensorPlacement& sensor = session.cell.sensor;
   if (!sensor.on_udp() || !session.sensor.described || !session.sensor.described->datagrams) return {};
-  const fieldbus::UdpPeer peer{sensor.host, sensor.port != 0 ? sensor.port : session.sensor.described->datagrams->port};
+  const fieldbus::UdpPeer peer = fieldbus::peer_of(sensor, session.sensor);
   if (surroundings.is_udp_here(peer)) return {};
   return {peer};
 }

@@ -116,8 +116,7 @@ std::string udp_plan_text(const PreparedSession& session) {
   const description::SensorPlacement& sensor = session.cell.sensor;
   if (!sensor.on_udp()) return {};
   const description::SensorProtocol& protocol = *session.sensor.described;
-  return "sensor: UDP, " +
-         fieldbus::peer_text({sensor.host, sensor.port != 0 ? sensor.port : protocol.datagrams->port}) + "\n  " +
+  return "sensor: UDP, " + fieldbus::peer_text(fieldbus::peer_of(sensor, session.sensor)) + "\n  " +
          description::number_text(protocol.rate_Hz) + " datagrams/s of " + std::to_string(protocol.sample_bytes()) +
          " bytes; a reading is up to " + in_ms(1.0 / protocol.rate_Hz) + " old when a cycle begins\n";
 }

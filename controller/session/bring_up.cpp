@@ -125,8 +125,7 @@ std::unique_ptr<fieldbus::ForceSensor> udp_sensor(const description::Cell& cell,
                       .found = std::to_string(cell.sensor.base_id),
                       .expected = "none: a sensor on UDP has an address instead, sensor.host"});
   }
-  const fieldbus::UdpPeer peer{cell.sensor.host,
-                               cell.sensor.port != 0 ? cell.sensor.port : sensor.described->datagrams->port};
+  const fieldbus::UdpPeer peer = fieldbus::peer_of(cell.sensor, sensor);
   return std::make_unique<fieldbus::DatagramSensor>(
       sensor, open_port(peer), fieldbus::DatagramSensorSettings{.peer = fieldbus::peer_text(peer)});
 }

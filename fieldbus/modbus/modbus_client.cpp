@@ -1,6 +1,5 @@
 #include "fieldbus/modbus/modbus_client.hpp"
 
-#include <arpa/inet.h>
 #include <modbus/modbus.h>
 #include <poll.h>
 #include <unistd.h>
@@ -11,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "models/base/network_address.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::fieldbus {
@@ -143,10 +143,7 @@ ModbusResult ModbusClient::read_write(std::uint8_t unit, std::uint16_t read_at, 
 }
 
 bool is_on_this_machine(const ModbusLineDescription& line) {
-  if (!line.serial()) {
-    in_addr address{};
-    return inet_pton(AF_INET, line.host.c_str(), &address) == 1 && ntohl(address.s_addr) >> 24 == 127;
-  }
+  if (!line.serial()) return description::is_loopback(line.host);
   std::error_code error;
   const std::filesystem::path device = std::filesystem::weakly_canonical(line.device, error);
   return !error && device.string().rfind("/dev/pts/", 0) == 0;

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <ctime>
 
+#include "models/base/network_address.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::fieldbus {
@@ -119,9 +120,10 @@ class UdpPort final : public DatagramPort {
 
 std::string peer_text(const UdpPeer& peer) { return peer.host + ", UDP port " + std::to_string(peer.port); }
 
-bool is_on_this_machine(const UdpPeer& peer) {
-  in_addr address{};
-  return inet_pton(AF_INET, peer.host.c_str(), &address) == 1 && ntohl(address.s_addr) >> 24 == 127;
+bool is_on_this_machine(const UdpPeer& peer) { return description::is_loopback(peer.host); }
+
+UdpPeer peer_of(const description::SensorPlacement& sensor, const description::SensorDescription& file) {
+  return {sensor.host, sensor.port != 0 ? sensor.port : file.described->datagrams->port};
 }
 
 std::unique_ptr<DatagramPort> open_udp(const UdpPeer& peer, UdpPeers peers) {

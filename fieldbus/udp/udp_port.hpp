@@ -11,6 +11,8 @@
 #include <string>
 
 #include "fieldbus/udp/datagram_port.hpp"
+#include "models/description/cell.hpp"
+#include "models/description/sensor.hpp"
 
 namespace proxarm::fieldbus {
 
@@ -20,6 +22,10 @@ struct UdpPeer {
 
   bool operator==(const UdpPeer&) const = default;
 };
+
+// Returns the address of a cell's sensor on UDP; `file` is the sensor's own, which has a port if the cell has none.
+// Precondition: the file describes datagrams.
+[[nodiscard]] UdpPeer peer_of(const description::SensorPlacement& sensor, const description::SensorDescription& file);
 
 // Returns the peer's address, such as "192.168.1.1, UDP port 49152".
 [[nodiscard]] std::string peer_text(const UdpPeer& peer);

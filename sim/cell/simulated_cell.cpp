@@ -316,28 +316,25 @@ std::unique_ptr<fieldbus::DatagramPort> SimulatedCell::datagram_port() {
 }
 
 void SimulatedCell::add_sensor(const description::SensorDescription& sensor) {
+  if (sensor.described) wrench_ = std::make_unique<PlantWrench>(plant_);
+  const auto describe = [&](DevicePort& port, std::uint32_t base_id) {
+    described_sensor_ =
+        std::make_unique<DescribedDevice>(sensor, DescribedDeviceConfig{.base_id = base_id}, *wrench_, port);
+  };
   if (sensor.described && sensor.described->registers) {
-    wrench_ = std::make_unique<PlantWrench>(plant_);
     sensor_registers_ = std::make_unique<ModbusSensorDevice>(*sensor.described->registers,
                                                              static_cast<std::uint8_t>(cell_.sensor.base_id));
-    described_sensor_ =
-        std::make_unique<DescribedDevice>(sensor, DescribedDeviceConfig{}, *wrench_, *sensor_registers_);
-    return;
+    return describe(*sensor_registers_, 0);
   }
   if (sensor.described && sensor.described->datagrams) {
-    wrench_ = std::make_unique<PlantWrench>(plant_);
     sensor_datagrams_ = std::make_unique<DatagramSensorDevice>();
-    described_sensor_ =
-        std::make_unique<DescribedDevice>(sensor, DescribedDeviceConfig{}, *wrench_, *sensor_datagrams_);
-    return;
+    return describe(*sensor_datagrams_, 0);
   }
   Clockwork& clockwork = *this;
   const std::size_t bus = bus_index(cell_.sensor.bus, "sensor.bus");
   nodes_.push_back(std::make_unique<DeviceNode>("sensor", bus, events_, clockwork));
   if (sensor.described) {
-    wrench_ = std::make_unique<PlantWrench>(plant_);
-    described_sensor_ = std::make_unique<DescribedDevice>(
-        sensor, DescribedDeviceConfig{.base_id = cell_.sensor.base_id}, *wrench_, *nodes_.back());
+    describe(*nodes_.back(), cell_.sensor.base_id);
     return nodes_.back()->set_device(*described_sensor_);
   }
   AtiDeviceConfig config;

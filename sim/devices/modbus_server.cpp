@@ -15,6 +15,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "models/base/network_address.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::sim {
@@ -79,7 +80,7 @@ void ModbusServer::open_tcp(const ModbusLineDescription& line) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(line.port));
-  if (inet_pton(AF_INET, line.host.c_str(), &address.sin_addr) != 1 || ntohl(address.sin_addr.s_addr) >> 24 != 127) {
+  if (inet_pton(AF_INET, line.host.c_str(), &address.sin_addr) != 1 || !description::is_loopback(line.host)) {
     throw description::SetupError(
         {.bus = line.name, .key = "host", .found = line.host, .expected = "a loopback address, 127.x.x.x"});
   }

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "models/base/network_address.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::sim {
@@ -16,7 +17,7 @@ UdpServer::UdpServer(const std::string& host, int port) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
-  if (inet_pton(AF_INET, host.c_str(), &address.sin_addr) != 1 || ntohl(address.sin_addr.s_addr) >> 24 != 127) {
+  if (inet_pton(AF_INET, host.c_str(), &address.sin_addr) != 1 || !description::is_loopback(host)) {
     throw description::SetupError(
         {.key = "sensor.host", .found = host, .expected = "a loopback address, 127.x.x.x, for a simulated sensor"});
   }
